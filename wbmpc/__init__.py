@@ -1,0 +1,1 @@
+"""Closed-loop MuJoCo testbed for three-stage whole-body MPC (SURENA-MINI)."""

@@ -1,0 +1,186 @@
+"""Every arrow of the block diagram: frozen dataclasses with shapes, units and frames.
+
+Conventions, everywhere in the project:
+  * SI units; world axes, z up; `GRAVITY` = 9.81 m/s².
+  * Side index 0 = left, 1 = right (`SIDES`).
+  * Forces act **on the robot** (a hand braced on a table has f_z > 0).
+  * `q`, `v` are Pinocchio's (quaternion xyzw, base velocity in the base frame); `qpos`, `qvel` are MuJoCo's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+GRAVITY = 9.81  # [m/s²]
+SIDES = ("left", "right")
+MAX_CONTACTS = 48  # slots for MuJoCo contacts in one tick's truth
+
+
+class SolveStatus(IntEnum):
+    """How one QP solve ended; anything but SOLVED is counted as a failure and triggers the documented fallback."""
+
+    SOLVED = 0
+    INFEASIBLE = 1
+    ITERATION_LIMIT = 2
+    NUMERICAL_ERROR = 3
+    NOT_RUN = 4
+
+
+class HandMode(IntEnum):
+    """What the tracker does with a hand."""
+
+    FREE = 0  # posture only
+    MOVE = 1  # track the commanded palm position (reach, approach, retract)
+    CONTACT = 2  # palm held on a surface, force tracked
+
+
+class ContactPhase(IntEnum):
+    """The life of a hand contact, in order."""
+
+    NONE = 0
+    NEEDED = 1
+    CHOSEN = 2
+    APPROACHING = 3
+    SENSED = 4
+    LOADED = 5
+    QUIET = 6
+    UNLOADED = 7
+    RELEASED = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """What the robot's own sensors say at one tick (noise included)."""
+
+    time: float  # [s]
+    joint_position: Vector  # (nj,) [rad]
+    joint_velocity: Vector  # (nj,) [rad/s]
+    imu_quaternion: Vector  # (4,) wxyz, IMU frame in world (the IMU's own attitude filter)
+    imu_gyro: Vector  # (3,) [rad/s] in the IMU frame
+    imu_accelerometer: Vector  # (3,) [m/s²] specific force in the IMU frame
+    sole_wrench_in_world: Vector  # (2, 6) [N, N·m] force and moment about the sole site, ankle force/torque sensors
+    palm_force_in_world: Vector  # (2, 3) [N] palm force sensors
+
+
+@dataclass(frozen=True, slots=True)
+class RobotState:
+    """The estimator's answer: everything the controller knows of the robot."""
+
+    time: float  # [s]
+    q: Vector  # (nq,) Pinocchio configuration, base pose in world
+    v: Vector  # (nv,) Pinocchio velocity, base twist in base
+    sole_wrench_in_world: Vector  # (2, 6) [N, N·m]
+    palm_force_in_world: Vector  # (2, 3) [N]
+    mass_scale: float  # estimated total mass / model mass
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """What the tracker follows at one tick, sampled from the latest plan."""
+
+    time: float  # [s]
+    com_position: Vector  # (3,) [m] in world
+    com_velocity: Vector  # (3,) [m/s]
+    com_acceleration: Vector  # (3,) [m/s²]
+    joint_position: Vector  # (nj,) [rad] posture reference, the integral of stage 2's joint velocities
+    joint_velocity: Vector  # (nj,) [rad/s] stage 2's joint velocities
+    foot_stance: NDArray[np.bool_]  # (2,)
+    foot_position: Vector  # (2, 3) [m] sole in world
+    foot_yaw: Vector  # (2,) [rad]
+    foot_velocity: Vector  # (2, 3) [m/s]
+    foot_acceleration: Vector  # (2, 3) [m/s²]
+    hand_mode: NDArray[np.int64]  # (2,) HandMode
+    hand_position: Vector  # (2, 3) [m] palm centre in world
+    hand_velocity: Vector  # (2, 3) [m/s]
+    hand_acceleration: Vector  # (2, 3) [m/s²]
+    hand_force: Vector  # (2, 3) [N] wanted contact force in world, zero when not in contact
+    hand_force_cap: Vector  # (2,) [N] bound on the normal force, ramped: contact transitions without jumps
+    hand_normal: Vector  # (2, 3) contact normal, out of the surface
+    hand_friction: Vector  # (2,) planned friction coefficient
+
+
+@dataclass(frozen=True, slots=True)
+class TorqueCommand:
+    """The tracker's answer at one tick."""
+
+    torque: Vector  # (nj,) [N·m]
+    acceleration: Vector  # (nv,) [rad/s², m/s²] Pinocchio v̇ of the solution
+    sole_wrench_in_world: Vector  # (2, 6) planned contact wrench, force then moment about the sole
+    palm_force_in_world: Vector  # (2, 3)
+    status: SolveStatus
+    solve_time: float  # [s] wall time of the whole tracker tick
+    fallback: bool  # the command is not this tick's solution
+
+
+@dataclass(frozen=True, slots=True)
+class CandidateReport:
+    """One candidate contact as stage 3 saw it when it fired: why it won or lost."""
+
+    patch: str
+    hand: int  # side index
+    chosen: bool
+    cost: float  # objective with this candidate's H_i = 1; inf when infeasible
+    reach_slack: float  # [m] reach margin; negative: beyond the arm by that much
+    friction_margin: float  # [N] smallest slack of the friction cone over the knots; nan when infeasible
+    force: Vector  # (3,) [N] force wanted at the worst knot, zero when infeasible
+    reason: str  # "chosen", "unreachable by 3.2 cm", "cost 1.8 above the best", ...
+
+
+@dataclass(frozen=True, slots=True)
+class StageReport:
+    """One solve of one stage."""
+
+    status: SolveStatus
+    solve_time: float  # [s] wall time, assembly included
+    iterations: int
+
+
+@dataclass(frozen=True, slots=True)
+class PlanReport:
+    """The plan as the recording and the checks see it. N knots at times t + T, ..., t + N T."""
+
+    time: float  # [s] time of the snapshot the plan was computed from
+    com: Vector  # (N, 3) [m] planned CoM
+    com_height_band: Vector  # (N, 2) [m] admissible band of stage 1
+    zmp: Vector  # (N, 2) [m] planned ZMP of the feet
+    support_polygon: Vector  # (k, 2) [m] vertices, counter-clockwise, margin not subtracted
+    delta_z: Vector  # (N, 2) [m] the ZMP shift that stage 2 asks of a contact
+    hand_reference: Vector  # (2, N, 3) [m] palm references over the horizon; nan for a free hand
+    contact_force: Vector  # (2, N, 3) [N] planned hand forces over the horizon
+    contact_phase: NDArray[np.int64]  # (2,) ContactPhase of each hand
+    contact_patch: tuple[str, str]  # name of the patch of each hand's contact, "" when none
+    progress: float  # task progress rate scale, 0 (gated) .. 1 (free)
+    stage1: StageReport
+    stage2: StageReport
+    stage3: StageReport  # status NOT_RUN when it did not fire
+    candidates: tuple[CandidateReport, ...]  # non-empty when stage 3 fired in this plan
+    plan_time: float  # [s] wall time of the whole plan
+    events: tuple[str, ...]  # "contact right table_2: chosen -> approaching", ...
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """What really happens in the plant at one tick; for the recorder and the checks, never for the controller."""
+
+    time: float  # [s]
+    qpos: Vector  # (nq,) MuJoCo
+    qvel: Vector  # (nv,) MuJoCo
+    torque: Vector  # (nj,) [N·m] applied joint torque of this tick, after the servo's limits
+    torque_limit: Vector  # (nj,) [N·m] what the servo could give at this speed, in this direction
+    com: Vector  # (3,) [m]
+    com_velocity: Vector  # (3,) [m/s]
+    palm_position: Vector  # (2, 3) [m]
+    sole_position: Vector  # (2, 3) [m]
+    torso_up: float  # cosine of the torso's tilt: 1 upright, 0 lying
+    external_force: Vector  # (3,) [N] declared disturbance acting now, sum over bodies
+    zmp: Vector  # (2,) [m] measured centre of pressure of the feet; nan when no foot pushes
+    contact_count: int
+    contact_geoms: NDArray[np.int64]  # (MAX_CONTACTS, 2) geom ids; rows past contact_count are -1
+    contact_position: Vector  # (MAX_CONTACTS, 3) [m]
+    contact_force: Vector  # (MAX_CONTACTS, 3) [N] in world, on the robot (on the second geom when both are the robot's)
+    contact_distance: Vector  # (MAX_CONTACTS,) [m] negative: penetration
