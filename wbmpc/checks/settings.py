@@ -1,0 +1,201 @@
+"""What a scenario may write under `checks:` and `universal:`; one frozen model per check, told apart by `kind`.
+
+Lengths in metres, times in seconds, forces as a fraction of body weight, torques as a fraction of the servo's limit.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from wbmpc.strict import StrictModel
+
+Positive = Annotated[float, Field(gt=0)]
+NonNegative = Annotated[float, Field(ge=0)]
+Fraction = Annotated[float, Field(gt=0, le=1)]
+
+
+class CheckSettings(StrictModel):
+    """Common to all checks."""
+
+    name: str | None = Field(default=None, min_length=1, description="name in the results; default: the kind")
+
+
+# --- universal: on in every scenario, thresholds settable -----------------------------------------------------------
+
+
+class NoFall(CheckSettings):
+    """The torso stays up and the CoM stays high, at every tick."""
+
+    kind: Literal["no_fall"] = "no_fall"
+    min_torso_up: float = Field(default=0.3, gt=-1, lt=1, description="smallest cosine of the torso's tilt")
+    min_com_height: NonNegative = Field(default=0.12, description="[m] smallest CoM height over the lower sole")
+
+
+class DeclaredContacts(CheckSettings):
+    """Only feet touch the world, and a palm only the object of its chosen patch; the robot never touches itself."""
+
+    kind: Literal["declared_contacts"] = "declared_contacts"
+    min_force: NonNegative = Field(default=0.01, description="[N] lighter contacts are ignored")
+    release_time: NonNegative = Field(default=0.5, description="[s] a palm may still touch so long after its release")
+
+
+class Penetration(CheckSettings):
+    """No contact is deeper than `max`."""
+
+    kind: Literal["penetration"] = "penetration"
+    max: Positive = Field(default=0.002, description="[m]")
+
+
+class TorqueLimit(CheckSettings):
+    """The applied torque never exceeds what the servo can give at that speed."""
+
+    kind: Literal["torque_limit"] = "torque_limit"
+    max: Positive = Field(default=1.0, description="largest |torque| / limit")
+
+
+class SpeedLimit(CheckSettings):
+    """No joint turns faster than its servo's no-load speed."""
+
+    kind: Literal["speed_limit"] = "speed_limit"
+    max: Positive = Field(default=1.0, description="largest |speed| / no-load speed")
+
+
+class SolverFailures(CheckSettings):
+    """Few solves fail: tracker fallbacks and failed stages, each as a share of its own number of solves."""
+
+    kind: Literal["solver_failures"] = "solver_failures"
+    max: NonNegative = Field(default=0.01, le=1, description="largest share of failed solves")
+
+
+class MomentumBalance(CheckSettings):
+    """The contact forces and the declared disturbances explain the CoM's motion: no hidden support exists."""
+
+    kind: Literal["momentum_balance"] = "momentum_balance"
+    window: Positive = Field(default=0.05, description="[s] length of the impulse windows")
+    max: Positive = Field(default=0.02, description="largest |missing impulse| / (body weight · window)")
+
+
+class UniversalSettings(StrictModel):
+    """The scenario's `universal:` block."""
+
+    no_fall: NoFall = NoFall()
+    declared_contacts: DeclaredContacts = DeclaredContacts()
+    penetration: Penetration = Penetration()
+    torque_limit: TorqueLimit = TorqueLimit()
+    speed_limit: SpeedLimit = SpeedLimit()
+    solver_failures: SolverFailures = SolverFailures()
+    momentum_balance: MomentumBalance = MomentumBalance()
+
+
+# --- of a scenario: listed under `checks:` --------------------------------------------------------------------------
+
+
+class Reach(CheckSettings):
+    """One palm stays within `max` of the reach target for a whole window of length `hold`.
+
+    The value is the smallest, over all such windows and over the hands, of the largest palm-to-target distance.
+    """
+
+    kind: Literal["reach"]
+    max: Positive = Field(description="[m]")
+    hold: Positive = Field(description="[s]")
+    target: tuple[float, float, float] | None = Field(
+        default=None, description="[m] in world; default: the target of the scenario's reach task"
+    )
+
+
+class Withdrawn(CheckSettings):
+    """During the last `duration` the robot stands upright, its CoM back where it started, no hand in contact."""
+
+    kind: Literal["withdrawn"]
+    com_tolerance: Positive = Field(default=0.02, description="[m] CoM's distance from where it started")
+    duration: Positive = Field(default=0.5, description="[s] how long at the end")
+
+
+class ComBeyondToes(CheckSettings):
+    """While reaching the hold, the CoM's ground projection is at least `min` outside the feet's support polygon."""
+
+    kind: Literal["com_beyond_toes"]
+    min: float = Field(description="[m]")
+    hold: Positive = Field(description="[s]")
+
+
+class BraceForce(CheckSettings):
+    """While reaching the hold, the hands' normal contact forces sum to at least `min` of the body weight."""
+
+    kind: Literal["brace_force"]
+    min: Positive = Field(description="fraction of body weight")
+    hold: Positive = Field(description="[s]")
+
+
+class TorquePeak(CheckSettings):
+    """The largest applied torque, as a fraction of the joint's stall torque limit."""
+
+    kind: Literal["torque_peak"]
+    max: Fraction
+
+
+class ContactPatches(CheckSettings):
+    """Which patches the planner chose, and how many hand contacts were made.
+
+    `max_count: 0` means: no hand ever touched anything and stage 3 never fired.
+    """
+
+    kind: Literal["contact_patches"]
+    allowed: tuple[str, ...] | None = Field(default=None, description="patches that may be chosen; default: any")
+    min_count: int = Field(default=0, ge=0, description="fewest hand contacts made")
+    max_count: int | None = Field(default=None, ge=0, description="most hand contacts made; default: any number")
+
+
+class HeightWaypoint(StrictModel):
+    """One demand on the CoM height."""
+
+    time: NonNegative = Field(description="[s]")
+    height: Positive = Field(description="[m] CoM above the floor")
+
+
+class ComHeight(CheckSettings):
+    """The CoM passes through each height within `max`, at some tick within `window` of each waypoint's time."""
+
+    kind: Literal["com_height"]
+    waypoints: tuple[HeightWaypoint, ...] = Field(min_length=1)
+    max: Positive = Field(description="[m]")
+    window: NonNegative = Field(default=0.1, description="[s] half-width around the waypoint's time")
+
+
+class UprightAtEnd(CheckSettings):
+    """During the last `duration` the robot stands upright and still."""
+
+    kind: Literal["upright_at_end"]
+    min_torso_up: float = Field(default=0.95, gt=-1, lt=1, description="smallest cosine of the torso's tilt")
+    max_com_speed: Positive = Field(default=0.05, description="[m/s]")
+    duration: Positive = Field(default=0.5, description="[s]")
+
+
+class PushRecovery(CheckSettings):
+    """A push of at least `min_impulse` per kg really acted, and the CoM was captured.
+
+    The value is the time from the push's end until the CoM speed stays below `max_com_speed` for good.
+    """
+
+    kind: Literal["push_recovery"]
+    min_impulse: Positive = Field(description="[N·s/kg] per kg of robot, sum over the declared pushes' directions")
+    max_time: Positive = Field(default=3.0, description="[s]")
+    max_com_speed: Positive = Field(default=0.05, description="[m/s]")
+
+
+UniversalCheck = NoFall | DeclaredContacts | Penetration | TorqueLimit | SpeedLimit | SolverFailures | MomentumBalance
+ScenarioCheck = Annotated[
+    Reach
+    | Withdrawn
+    | ComBeyondToes
+    | BraceForce
+    | TorquePeak
+    | ContactPatches
+    | ComHeight
+    | UprightAtEnd
+    | PushRecovery,
+    Field(discriminator="kind"),
+]
