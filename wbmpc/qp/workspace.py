@@ -1,0 +1,62 @@
+"""Backends by name. To add one: one file with a workspace class, one line in a dict; the tests loop over the dicts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from difflib import get_close_matches
+
+from wbmpc.errors import WbmpcError
+from wbmpc.qp.problem import QuadraticProgram
+from wbmpc.qp.solution import QpSolution, QpWorkspace
+
+__all__ = ["MIQP_BACKENDS", "QP_BACKENDS", "QpSolution", "QpWorkspace", "make_mip_workspace", "make_workspace"]
+
+# Each factory imports its solver on first use: osqp, highspy and qpsolvers take a second to load together.
+
+
+def _daqp(problem: QuadraticProgram) -> QpWorkspace:
+    from wbmpc.qp.daqp_workspace import DaqpWorkspace
+
+    return DaqpWorkspace(problem)
+
+
+QP_BACKENDS: dict[str, Callable[[QuadraticProgram], QpWorkspace]] = {"daqp": _daqp}
+MIQP_BACKENDS: dict[str, Callable[[QuadraticProgram], QpWorkspace]] = {"daqp": _daqp}
+
+
+class UnknownBackendError(WbmpcError):
+    """The scenario or the caller names a solver that does not exist or is not installed."""
+
+    def __init__(self, name: str, choices: list[str]) -> None:
+        near = get_close_matches(name, choices, n=1)
+        hint = f", did you mean '{near[0]}'?" if near else ""
+        super().__init__(f"unknown QP backend '{name}'{hint} Choices: {', '.join(choices)}")
+
+
+class MisplacedBinariesError(WbmpcError):
+    """A problem with binary variables was given to a QP backend."""
+
+
+def make_workspace(backend: str, problem: QuadraticProgram) -> QpWorkspace:
+    """A workspace of one of QP_BACKENDS, bound to `problem`.
+
+    Raises:
+        UnknownBackendError: no such backend, with the choices and a near miss.
+        MisplacedBinariesError: the problem has binary variables.
+    """
+    if problem.binary.size:
+        raise MisplacedBinariesError(f"{problem.binary.size} binary variables need one of {', '.join(MIQP_BACKENDS)}")
+    if backend not in QP_BACKENDS:
+        raise UnknownBackendError(backend, list(QP_BACKENDS))
+    return QP_BACKENDS[backend](problem)
+
+
+def make_mip_workspace(backend: str, problem: QuadraticProgram) -> QpWorkspace:
+    """A workspace of one of MIQP_BACKENDS, bound to `problem`; exact up to the backend's node limit.
+
+    Raises:
+        UnknownBackendError: no such backend, with the choices and a near miss.
+    """
+    if backend not in MIQP_BACKENDS:
+        raise UnknownBackendError(backend, list(MIQP_BACKENDS))
+    return MIQP_BACKENDS[backend](problem)
