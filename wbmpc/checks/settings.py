@@ -25,6 +25,12 @@ class CheckSettings(StrictModel):
 # --- universal: on in every scenario, thresholds settable -----------------------------------------------------------
 
 
+class Completed(CheckSettings):
+    """The run reached its full duration with a finite state."""
+
+    kind: Literal["completed"] = "completed"
+
+
 class NoFall(CheckSettings):
     """The torso stays up and the CoM stays high, at every tick."""
 
@@ -49,7 +55,7 @@ class Penetration(CheckSettings):
 
 
 class TorqueLimit(CheckSettings):
-    """The applied torque never exceeds what the servo can give at that speed."""
+    """The applied torque never exceeds what the servo can give at that speed, in that direction."""
 
     kind: Literal["torque_limit"] = "torque_limit"
     max: Positive = Field(default=1.0, description="largest |torque| / limit")
@@ -80,6 +86,7 @@ class MomentumBalance(CheckSettings):
 class UniversalSettings(StrictModel):
     """The scenario's `universal:` block."""
 
+    completed: Completed = Completed()
     no_fall: NoFall = NoFall()
     declared_contacts: DeclaredContacts = DeclaredContacts()
     penetration: Penetration = Penetration()
@@ -92,18 +99,23 @@ class UniversalSettings(StrictModel):
 # --- of a scenario: listed under `checks:` --------------------------------------------------------------------------
 
 
-class Reach(CheckSettings):
-    """One palm stays within `max` of the reach target for a whole window of length `hold`.
+class HoldSettings(CheckSettings):
+    """Common to the checks of a reach: what counts as the hold.
 
-    The value is the smallest, over all such windows and over the hands, of the largest palm-to-target distance.
+    The hold is the window of length `hold`, and the hand, with the smallest largest palm-to-target distance.
     """
 
-    kind: Literal["reach"]
-    max: Positive = Field(description="[m]")
     hold: Positive = Field(description="[s]")
     target: tuple[float, float, float] | None = Field(
         default=None, description="[m] in world; default: the target of the scenario's reach task"
     )
+
+
+class Reach(HoldSettings):
+    """One palm stays within `max` of the reach target during the whole hold."""
+
+    kind: Literal["reach"]
+    max: Positive = Field(description="[m]")
 
 
 class Withdrawn(CheckSettings):
@@ -111,23 +123,22 @@ class Withdrawn(CheckSettings):
 
     kind: Literal["withdrawn"]
     com_tolerance: Positive = Field(default=0.02, description="[m] CoM's distance from where it started")
+    min_torso_up: float = Field(default=0.9, gt=-1, lt=1, description="smallest cosine of the torso's tilt")
     duration: Positive = Field(default=0.5, description="[s] how long at the end")
 
 
-class ComBeyondToes(CheckSettings):
-    """While reaching the hold, the CoM's ground projection is at least `min` outside the feet's support polygon."""
+class ComBeyondToes(HoldSettings):
+    """During the hold the CoM's ground projection is at least `min` outside the feet's support polygon."""
 
     kind: Literal["com_beyond_toes"]
     min: float = Field(description="[m]")
-    hold: Positive = Field(description="[s]")
 
 
-class BraceForce(CheckSettings):
-    """While reaching the hold, the hands' normal contact forces sum to at least `min` of the body weight."""
+class BraceForce(HoldSettings):
+    """During the hold the hands' normal contact forces sum to at least `min` of the body weight."""
 
     kind: Literal["brace_force"]
     min: Positive = Field(description="fraction of body weight")
-    hold: Positive = Field(description="[s]")
 
 
 class TorquePeak(CheckSettings):

@@ -1,0 +1,122 @@
+"""What the checks read: the recording, and the facts of the plant and scenario that no recording holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbmpc.recorder import Recorder
+from wbmpc.signals import GRAVITY, ContactPhase, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """True facts of the plant (not of the controller's model), per geom id, per joint, per patch."""
+
+    duration: float  # [s] how long the run should have lasted
+    timestep: float  # [s]
+    mass: float  # [kg] the plant's true robot mass, unmodelled mass included
+    geom_name: tuple[str, ...]  # by geom id; the body's name where the geom has none
+    geom_is_robot: NDArray[np.bool_]  # (ngeom,)
+    geom_foot: NDArray[np.int64]  # (ngeom,) side index of the foot that the geom is part of, -1: not a foot
+    geom_palm: NDArray[np.int64]  # (ngeom,) side index of the palm, -1: not a palm
+    joint_name: tuple[str, ...]  # (nj,)
+    stall_torque: Vector  # (nj,) [N·m]
+    no_load_speed: Vector  # (nj,) [rad/s]
+    patch_geoms: Mapping[str, frozenset[int]]  # geoms of the object that carries each candidate patch
+    patch_normal: Mapping[str, Vector]  # (3,) out of the surface, in world
+    reach_targets: tuple[Vector, ...]  # (3,) [m] in world, of the scenario's reach tasks
+    sole_vertices: Callable[[Vector], Vector]  # qpos (nq,) -> (2, k, 3) [m] corners of both soles in world
+
+
+class CheckContext:
+    """A finished run as the checks see it: the recorder's columns, the facts, and what both together say.
+
+    Args:
+        recorder: the run's columns; n ticks, c contacts over all ticks.
+        facts: of the plant and the scenario.
+    """
+
+    def __init__(self, recorder: Recorder, facts: Facts) -> None:
+        self.recorder = recorder
+        self.facts = facts
+
+    @property
+    def time(self) -> Vector:
+        """(n,) [s]"""
+        return self.recorder.time
+
+    @property
+    def body_weight(self) -> float:
+        """[N]"""
+        return self.facts.mass * GRAVITY
+
+    def ticks(self, duration: float) -> int:
+        """Number of steps in `duration` [s], at least one."""
+        return max(1, round(duration / self.facts.timestep))
+
+    @cached_property
+    def contact_time(self) -> Vector:
+        """(c,) [s] time of each contact."""
+        return self.time[self.recorder.contact_tick]
+
+    @cached_property
+    def contact_sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Robot geom (c,), world geom (c,), and whether the contact joins the robot with the world (c,).
+
+        Where it does not (self-collision, or two objects), the two geoms are in MuJoCo's order.
+        """
+        geoms = self.recorder.contacts.geoms.astype(np.int64)
+        robot = self.facts.geom_is_robot[geoms]  # (c, 2)
+        swap = robot[:, 1] & ~robot[:, 0]
+        ordered = np.where(swap[:, None], geoms[:, ::-1], geoms)
+        return ordered[:, 0], ordered[:, 1], robot[:, 0] ^ robot[:, 1]
+
+    @cached_property
+    def palm_force(self) -> Vector:
+        """(n, 2, 3) [N] force of the world on each palm, from the plant's contacts."""
+        return self._force_on(self.facts.geom_palm)
+
+    @cached_property
+    def sole_force(self) -> Vector:
+        """(n, 2, 3) [N] force of the world on each foot, from the plant's contacts."""
+        return self._force_on(self.facts.geom_foot)
+
+    @cached_property
+    def world_force(self) -> Vector:
+        """(n, 3) [N] force of the whole world on the robot, from the plant's contacts."""
+        _, _, outside = self.contact_sides
+        total = np.zeros((self.recorder.ticks, 3))
+        np.add.at(total, self.recorder.contact_tick[outside], self.recorder.contacts.force[outside])
+        return total
+
+    def _force_on(self, side_of_geom: NDArray[np.int64]) -> Vector:
+        robot_geom, _, outside = self.contact_sides
+        side = side_of_geom[robot_geom]
+        rows = outside & (side >= 0)
+        total = np.zeros((self.recorder.ticks, 2, 3))
+        np.add.at(total, (self.recorder.contact_tick[rows], side[rows]), self.recorder.contacts.force[rows])
+        return total
+
+    @cached_property
+    def plan_of_tick(self) -> NDArray[np.int64]:
+        """(n,) index of the newest plan whose snapshot is not younger than the tick, -1 before the first."""
+        times = np.array([plan.time for plan in self.recorder.plans])
+        return np.searchsorted(times, self.time + 1e-9, side="right") - 1
+
+    @cached_property
+    def patch_of_tick(self) -> list[tuple[str, str]]:
+        """(n,) patch that each hand (left, right) is chosen for, approaches or holds; "" when none."""
+        per_plan = [
+            tuple(
+                patch if ContactPhase.CHOSEN <= phase <= ContactPhase.UNLOADED else ""
+                for patch, phase in zip(plan.contact_patch, plan.contact_phase, strict=True)
+            )
+            for plan in self.recorder.plans
+        ]
+        per_plan.append(("", ""))  # index -1: before the first plan
+        return [per_plan[index] for index in self.plan_of_tick]

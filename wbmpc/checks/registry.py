@@ -1,0 +1,77 @@
+"""All checks by kind, and their evaluation in order: the universal ones first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from wbmpc.checks.actuators import SpeedLimitCheck, TorqueLimitCheck, TorquePeakCheck
+from wbmpc.checks.contacts import ContactPatchesCheck, DeclaredContactsCheck, PenetrationCheck
+from wbmpc.checks.context import CheckContext
+from wbmpc.checks.momentum import MomentumBalanceCheck
+from wbmpc.checks.posture import ComHeightCheck, CompletedCheck, NoFallCheck, UprightAtEndCheck, WithdrawnCheck
+from wbmpc.checks.push import PushRecoveryCheck
+from wbmpc.checks.reach import BraceForceCheck, ComBeyondToesCheck, ReachCheck
+from wbmpc.checks.result import CheckResult, failed
+from wbmpc.checks.settings import CheckSettings, UniversalSettings
+from wbmpc.checks.solvers import SolverFailuresCheck
+
+
+class Check(Protocol):
+    """One check, made from its settings."""
+
+    def evaluate(self, context: CheckContext, name: str) -> CheckResult:
+        """Compare the run with the threshold; `name` goes into the result."""
+        ...
+
+
+CHECKS: dict[str, Any] = {  # kind -> class; a class takes its own settings model
+    "completed": CompletedCheck,
+    "no_fall": NoFallCheck,
+    "declared_contacts": DeclaredContactsCheck,
+    "penetration": PenetrationCheck,
+    "torque_limit": TorqueLimitCheck,
+    "speed_limit": SpeedLimitCheck,
+    "solver_failures": SolverFailuresCheck,
+    "momentum_balance": MomentumBalanceCheck,
+    "reach": ReachCheck,
+    "withdrawn": WithdrawnCheck,
+    "com_beyond_toes": ComBeyondToesCheck,
+    "brace_force": BraceForceCheck,
+    "torque_peak": TorquePeakCheck,
+    "contact_patches": ContactPatchesCheck,
+    "com_height": ComHeightCheck,
+    "upright_at_end": UprightAtEndCheck,
+    "push_recovery": PushRecoveryCheck,
+}
+
+
+def universal_checks(universal: UniversalSettings) -> list[CheckSettings]:
+    """The universal checks with their settings, in the order of the schema."""
+    return [getattr(universal, field) for field in UniversalSettings.model_fields]
+
+
+def evaluate_checks(
+    context: CheckContext, *, universal: UniversalSettings, checks: Sequence[CheckSettings]
+) -> list[CheckResult]:
+    """Every check of a run. Names are unique: a second check of one kind without a name gets `kind_2`."""
+    results: list[CheckResult] = []
+    used: set[str] = set()
+    for config in [*universal_checks(universal), *checks]:
+        kind: str = config.kind  # type: ignore[attr-defined]
+        name = _unused(config.name or kind, used)
+        if context.recorder.ticks == 0:
+            results.append(failed(name, 0.0, "1", "the run has no ticks"))
+        else:
+            check: Check = CHECKS[kind](config)
+            results.append(check.evaluate(context, name))
+    return results
+
+
+def _unused(name: str, used: set[str]) -> str:
+    candidate, count = name, 1
+    while candidate in used:
+        count += 1
+        candidate = f"{name}_{count}"
+    used.add(candidate)
+    return candidate
