@@ -30,6 +30,7 @@ class Facts:
     patch_geoms: Mapping[str, frozenset[int]]  # geoms of the object that carries each candidate patch
     patch_normal: Mapping[str, Vector]  # (3,) out of the surface, in world
     reach_targets: tuple[Vector, ...]  # (3,) [m] in world, of the scenario's reach tasks
+    com_heights: tuple[tuple[float, float], ...]  # ([s], [m]) waypoints of the com_height task, above the floor
     sole_vertices: Callable[[Vector], Vector]  # qpos (nq,) -> (2, k, 3) [m] corners of both soles in world
 
 

@@ -96,13 +96,16 @@ class ComHeightCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
+        waypoints = context.facts.com_heights
+        if not waypoints:
+            return failed(name, self.config.max, "m", "the scenario has no com_height task")
         worst, worst_time = -1.0, 0.0
-        for waypoint in self.config.waypoints:
-            near = np.abs(context.time - waypoint.time) <= self.config.window + 0.5 * context.facts.timestep
+        for time, height in waypoints:
+            near = np.abs(context.time - time) <= self.config.window + 0.5 * context.facts.timestep
             if not near.any():
-                return failed(name, self.config.max, "m", f"the run ended before t = {waypoint.time:g} s")
-            error = float(np.min(np.abs(context.recorder.com[near, 2] - waypoint.height)))
+                return failed(name, self.config.max, "m", f"the run ended before t = {time:g} s")
+            error = float(np.min(np.abs(context.recorder.com[near, 2] - height)))
             if not error <= worst:  # keeps a nan
-                worst, worst_time = error, waypoint.time
-        message = f"largest error of {len(self.config.waypoints)} waypoints, at t = {worst_time:g} s"
+                worst, worst_time = error, time
+        message = f"largest error of {len(waypoints)} waypoints, at t = {worst_time:g} s"
         return at_most(name, worst, self.config.max, "m", message, when=worst_time)

@@ -9,11 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from wbmpc.strict import StrictModel
-
-Positive = Annotated[float, Field(gt=0)]
-NonNegative = Annotated[float, Field(ge=0)]
-Fraction = Annotated[float, Field(gt=0, le=1)]
+from wbmpc.strict import NonNegative, Positive, StrictModel
 
 
 class CheckSettings(StrictModel):
@@ -145,7 +141,7 @@ class TorquePeak(CheckSettings):
     """The largest applied torque, as a fraction of the joint's stall torque limit."""
 
     kind: Literal["torque_peak"]
-    max: Fraction
+    max: Positive = Field(le=1, description="largest |torque| / stall torque")
 
 
 class ContactPatches(CheckSettings):
@@ -160,18 +156,10 @@ class ContactPatches(CheckSettings):
     max_count: int | None = Field(default=None, ge=0, description="most hand contacts made; default: any number")
 
 
-class HeightWaypoint(StrictModel):
-    """One demand on the CoM height."""
-
-    time: NonNegative = Field(description="[s]")
-    height: Positive = Field(description="[m] CoM above the floor")
-
-
 class ComHeight(CheckSettings):
-    """The CoM passes through each height within `max`, at some tick within `window` of each waypoint's time."""
+    """The CoM comes within `max` of the height of every waypoint of the scenario's com_height task, about its time."""
 
     kind: Literal["com_height"]
-    waypoints: tuple[HeightWaypoint, ...] = Field(min_length=1)
     max: Positive = Field(description="[m]")
     window: NonNegative = Field(default=0.1, description="[s] half-width around the waypoint's time")
 

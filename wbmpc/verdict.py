@@ -1,0 +1,115 @@
+"""The machine-readable answer of one run: NAME.json, whose names are documented in docs/results.md and stay stable."""
+
+from __future__ import annotations
+
+import json
+import math
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from wbmpc.checks.result import CheckResult
+from wbmpc.recorder import Recorder
+from wbmpc.signals import SolveStatus, StageReport, Vector
+
+VERSIONED = ("wbmpc", "mujoco", "pin", "numpy", "scipy", "daqp", "osqp", "qpsolvers", "highspy", "rerun-sdk")
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Everything in NAME.json."""
+
+    scenario: str
+    seed: int
+    checks: Sequence[CheckResult]
+    metrics: Mapping[str, float]
+    solver: Mapping[str, Mapping[str, float]]
+    real_time_factor: float  # simulated time per wall time
+    missed_deadlines: int
+    state_sha256: str
+    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+
+    @property
+    def passed(self) -> bool:
+        """All checks passed, and there was at least one."""
+        return bool(self.checks) and all(check.passed for check in self.checks)
+
+    @property
+    def failing(self) -> tuple[str, ...]:
+        """Names of the failed checks."""
+        return tuple(check.name for check in self.checks if not check.passed)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The JSON document: only finite numbers, None where a value could not be measured."""
+        document = {
+            "scenario": self.scenario,
+            "seed": self.seed,
+            "passed": self.passed,
+            "checks": [asdict(check) for check in self.checks],
+            "metrics": dict(self.metrics),
+            "solver": {stage: dict(row) for stage, row in self.solver.items()},
+            "timing": {"real_time_factor": self.real_time_factor, "missed_deadlines": self.missed_deadlines},
+            "versions": dict(self.versions),
+            "state_sha256": self.state_sha256,
+        }
+        return _finite(document)
+
+    def write(self, path: Path) -> None:
+        """Write the JSON document to `path`, whole or not at all."""
+        write_json(path, self.as_dict())
+
+
+def write_json(path: Path, document: Mapping[str, Any]) -> None:
+    """Write a JSON document with a stable layout; a killed process leaves the old file or the new one."""
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    partial.replace(path)
+
+
+def versions() -> dict[str, str]:
+    """Version of Python and of every package that a verdict depends on; "absent" when one is not installed."""
+    found = {"python": platform.python_version()}
+    for name in VERSIONED:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "absent"
+    return found
+
+
+def solver_statistics(recorder: Recorder) -> dict[str, dict[str, float]]:
+    """Per stage: number of solves, failures, and p50, p99, max of the wall time of one solve [s].
+
+    Stages: `tracker` (a whole tick), `stage1`, `stage2`, `stage3` (when it fired), `plan` (a whole plan).
+    """
+    statistics = {"tracker": _row(recorder.command_solve_time, int(recorder.command_fallback.sum()))}
+    for stage in ("stage1", "stage2", "stage3"):
+        reports: list[StageReport] = [getattr(plan, stage) for plan in recorder.plans]
+        ran = [report for report in reports if report.status != SolveStatus.NOT_RUN]
+        failures = sum(report.status != SolveStatus.SOLVED for report in ran)
+        statistics[stage] = _row(np.array([report.solve_time for report in ran]), failures)
+    statistics["plan"] = _row(np.array([plan.plan_time for plan in recorder.plans]), 0)
+    return statistics
+
+
+def _row(times: Vector, failures: int) -> dict[str, float]:
+    if times.size == 0:
+        return {"solves": 0, "failures": failures, "p50": math.nan, "p99": math.nan, "max": math.nan}
+    p50, p99, most = (float(t) for t in np.percentile(times, [50, 99, 100]))
+    return {"solves": int(times.size), "failures": failures, "p50": p50, "p99": p99, "max": most}
+
+
+def _finite(value: Any) -> Any:
+    """The value with every nan and inf replaced by None, which JSON can say."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
