@@ -8,7 +8,7 @@ The hash over the state trajectory lives here, whether or not a file is written.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any, Protocol
@@ -48,12 +48,13 @@ class Contacts:
     distance: NDArray[np.float64]  # (c,) [m] negative: penetration
 
 
-# Shapes of the recorded fields; "q", "v", "j" stand for nq, nv, nj. Units and frames are those of wbmpc.signals.
+# Shapes of the recorded fields; "q", "v", "j" stand for the robot's nq, nv, nj, "Q" and "V" for the whole plant's.
+# Units and frames are those of wbmpc.signals.
 _Layout = dict[str, tuple[tuple[int | str, ...], type]]
 _TRUTH: _Layout = {
     "time": ((), float),
-    "qpos": (("q",), float),
-    "qvel": (("v",), float),
+    "qpos": (("Q",), float),
+    "qvel": (("V",), float),
     "torque": (("j",), float),
     "torque_limit": (("j",), float),
     "com": ((3,), float),
@@ -78,6 +79,8 @@ _SETPOINT: _Layout = {
     "com_acceleration": ((3,), float),
     "joint_position": (("j",), float),
     "joint_velocity": (("j",), float),
+    "torso_rotation": ((3, 3), float),
+    "torso_angular_velocity": ((3,), float),
     "foot_stance": ((2,), bool),
     "foot_position": ((2, 3), float),
     "foot_yaw": ((2,), float),
@@ -121,10 +124,18 @@ class Recorder:
     Args:
         robot: gives nq, nv and nj.
         expected_ticks: rows allocated at the start; more ticks are welcome and cost one copy at each doubling.
+        plant_nq, plant_nv: sizes of `Truth.qpos` and `Truth.qvel`, when the world has free objects besides the robot.
     """
 
-    def __init__(self, robot: RobotDimensions, *, expected_ticks: int) -> None:
-        size = {"q": robot.nq, "v": robot.nv, "j": robot.nj}
+    def __init__(
+        self,
+        robot: RobotDimensions,
+        *,
+        expected_ticks: int,
+        plant_nq: int | None = None,
+        plant_nv: int | None = None,
+    ) -> None:
+        size = {"Q": plant_nq or robot.nq, "V": plant_nv or robot.nv, "q": robot.nq, "v": robot.nv, "j": robot.nj}
         self._capacity = max(1, expected_ticks)
         self._columns: dict[str, NDArray[Any]] = {}
         for _, prefix, fields in LAYOUT:
@@ -216,7 +227,8 @@ class Recorder:
     @property
     def contacts(self) -> Contacts:
         """Contacts of all ticks, in order of time; `contact_tick` gives the tick of each row."""
-        return self._contact_rows(0, int(self.contact_count.sum()))
+        total, table = int(self.contact_count.sum()), self._contacts
+        return Contacts(table.geoms[:total], table.position[:total], table.force[:total], table.distance[:total])
 
     @property
     def contact_tick(self) -> NDArray[np.int64]:
@@ -225,21 +237,21 @@ class Recorder:
 
     def contacts_at(self, tick: int) -> Contacts:
         """Contacts of one tick."""
-        counts = self.contact_count
-        start = int(counts[:tick].sum())
-        return self._contact_rows(start, start + int(counts[tick]))
+        return self.contacts_of([tick])
+
+    def contacts_of(self, ticks: Sequence[int] | NDArray[np.integer]) -> Contacts:
+        """Contacts of the given ticks one after another; `contact_count[ticks]` says how many belong to each."""
+        ends = np.cumsum(self.contact_count)
+        rows = [np.arange(ends[k] - self.contact_count[k], ends[k]) for k in ticks]
+        index = np.concatenate(rows) if rows else np.zeros(0, np.int64)
+        table = self._contacts
+        return Contacts(table.geoms[index], table.position[index], table.force[index], table.distance[index])
 
     # ---------------------------------------------------------------- inside
 
     @staticmethod
     def _allocate_contacts(rows: int) -> Contacts:
         return Contacts(np.zeros((rows, 2), np.int32), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros(rows))
-
-    def _contact_rows(self, start: int, stop: int) -> Contacts:
-        table = self._contacts
-        return Contacts(
-            table.geoms[start:stop], table.position[start:stop], table.force[start:stop], table.distance[start:stop]
-        )
 
     def _append_contacts(self, truth: Truth) -> None:
         count = truth.contact_count

@@ -1,0 +1,174 @@
+"""Recorder -> one .rrd file, in blocks while the run goes on, so that a killed run leaves a readable file."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import mujoco
+import numpy as np
+import rerun as rr
+
+from wbmpc.errors import WbmpcError
+from wbmpc.recorder import Recorder
+from wbmpc.rerun_sink.blueprint import layout
+from wbmpc.rerun_sink.documents import verdict_document
+from wbmpc.rerun_sink.plans import describe_plans, write_plans
+from wbmpc.rerun_sink.scene import Patch, Scene
+from wbmpc.rerun_sink.stream import Stream
+from wbmpc.rerun_sink.ticks import describe_ticks, write_ticks
+
+APPLICATION = "wbmpc"
+
+
+class RerunSink:
+    """Writes what a recorder holds to `path`; reads the recorder and nothing else.
+
+    Args:
+        path: the .rrd file; replaced when it exists, its folder made when it does not.
+        model: compiled MjModel of robot and world; kept in the file, so that `wbmpc render` needs nothing else.
+        joint_names: (nj,) in the order of the torques.
+        scenario_text: the scenario as run, overrides included.
+        tick_rate: ticks a second [Hz]; `rate` must divide it.
+        rate: samples a second in the file [Hz].
+        knot_period: T of the planner [s], to draw a plan's first knot at the time it speaks of.
+        patches: candidate contact patches of the scene.
+        versions: names and versions of the programs that made the run.
+        block: simulated time between two writes [s]; what a killed run can lose.
+
+    Raises:
+        WbmpcError: the file cannot be written, or `rate` does not divide `tick_rate`.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        model: Any,
+        recorder: Recorder,
+        *,
+        joint_names: Sequence[str],
+        scenario_name: str,
+        scenario_text: str,
+        seed: int,
+        tick_rate: float,
+        rate: float = 100.0,
+        knot_period: float = 0.1,
+        patches: Sequence[Patch] = (),
+        versions: Mapping[str, str] | None = None,
+        block: float = 1.0,
+    ) -> None:
+        self._stride = _stride(tick_rate, rate)
+        self._recorder, self._block, self._knot_period = recorder, block, knot_period
+        self._patches = {patch.name: patch for patch in patches}
+        self._next_flush = block
+        self._ticks_done = self._plans_done = self._events_done = 0
+        self._closed = False
+
+        recording = rr.RecordingStream(APPLICATION)
+        _open(recording, path, model)
+        self._stream = Stream(recording)
+        recording.send_recording_name(f"{scenario_name}, seed {seed}")
+        recording.send_property("run", rr.AnyValues(scenario=scenario_name, seed=seed, sample_rate=rate))
+        if versions:
+            recording.send_property("versions", rr.AnyValues(**versions))
+        self._stream.static("/scenario", rr.TextDocument(f"```yaml\n{scenario_text}\n```", media_type="text/markdown"))
+        self._stream.static(
+            "/verdict", rr.TextDocument("No verdict yet: the run did not end.", media_type="text/plain")
+        )
+        self._stream.static("/model", rr.AnyValues(mjb=_packed(model), mujoco=mujoco.__version__))
+        self._scene = Scene(self._stream, model, patches)
+        describe_ticks(self._stream, joint_names)
+        describe_plans(self._stream)
+
+    def flush(self, now: float | None = None) -> None:
+        """Write what is new; with `now` [s], only when a block's time has passed (cheap enough for every tick)."""
+        if now is not None and now < self._next_flush:
+            return
+        if now is not None:
+            self._next_flush = now + self._block
+        recorder, first = self._recorder, self._ticks_done
+        self._ticks_done = recorder.ticks
+        rows = np.arange(-(-first // self._stride) * self._stride, self._ticks_done, self._stride)
+        if len(rows):
+            write_ticks(self._stream, recorder, rows, since=first)
+            self._scene.write_poses(recorder.time[rows], recorder.qpos[rows])
+        self._flush_plans()
+        self._flush_events()
+        # Blocking: once this returns the block is in the file, whatever happens to the process.
+        self._stream.recording.flush()
+
+    def finish(self, verdict: Mapping[str, Any]) -> None:
+        """Write what is left and the verdict (the content of NAME.json), as a text and as the file's properties."""
+        self.flush()
+        document = rr.TextDocument(verdict_document(verdict), media_type="text/markdown")
+        self._stream.static("/verdict", document)
+        plain = {k: v for k, v in verdict.items() if isinstance(v, bool | int | float | str)}
+        numbers = {k: float(v) for k, v in (verdict.get("metrics") or {}).items() if isinstance(v, int | float)}
+        self._stream.recording.send_property("verdict", rr.AnyValues(**plain))
+        if numbers:
+            self._stream.recording.send_property("metrics", rr.AnyValues(**numbers))
+
+    def close(self) -> None:
+        """Write what is left and close the file; belongs in a `finally`. May be called twice."""
+        if not self._closed:
+            self._closed = True
+            try:
+                self.flush()
+            finally:
+                self._stream.recording.disconnect()
+
+    def __enter__(self) -> RerunSink:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _flush_plans(self) -> None:
+        recorder = self._recorder
+        plans = recorder.plans[self._plans_done :]
+        self._plans_done += len(plans)
+        if not plans or not recorder.ticks:
+            return
+        ticks = np.searchsorted(recorder.time, [plan.time for plan in plans]).clip(max=recorder.ticks - 1)
+        ground = recorder.sole_position[ticks, :, 2].min(axis=1)
+        write_plans(self._stream, plans, ground=ground, knot_period=self._knot_period, patches=self._patches)
+
+    def _flush_events(self) -> None:
+        events = self._recorder.events[self._events_done :]
+        self._events_done += len(events)
+        self._stream.texts("/log/events", np.array([e.time for e in events]), [e.text for e in events])
+
+
+def _stride(tick_rate: float, rate: float) -> int:
+    stride = round(tick_rate / rate)
+    if stride < 1 or abs(stride * rate - tick_rate) > 1e-6 * tick_rate:
+        raise WbmpcError(f"recording rate {rate:g} Hz does not divide the tick rate {tick_rate:g} Hz")
+    return stride
+
+
+def _open(recording: Any, path: Path, model: Any) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb"):  # rerun reports an unwritable file from a thread of its own, too late to be told
+            pass
+    except OSError as error:
+        raise WbmpcError(f"cannot write the recording {path}: {error.strerror}") from error
+    data = mujoco.MjData(model)
+    if model.nkey:
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    look_at = data.subtree_com[1 if model.nbody > 1 else 0]
+    recording.save(path, default_blueprint=layout(look_at))
+
+
+def _packed(model: Any) -> bytes:
+    """The compiled model in MuJoCo's binary format, compressed."""
+    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return zlib.compress(buffer.tobytes())
