@@ -129,7 +129,8 @@ class Robot:
     def v_from_qvel(qpos: Vector, qvel: Vector) -> Vector:
         """Pinocchio velocity (nv,) of MuJoCo's: v = blkdiag(Rᵀ, I, I) qvel.
 
-        Both have the base's angular velocity in the base; the linear one MuJoCo has in the world, Pinocchio in the base.
+        Both have the base's angular velocity in the base; the linear one is in the world in MuJoCo, in the base in
+        Pinocchio.
         """
         v = np.array(qvel, dtype=np.float64)
         v[:3] = Robot.base_rotation(qpos).T @ qvel[:3]
