@@ -1,0 +1,132 @@
+"""The command line. Each command imports what it needs when it runs, so that `--version` and `validate` are quick."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from wbmpc.commands.exits import ExitCode, guarded
+
+app = typer.Typer(
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Closed-loop MuJoCo testbed for three-stage whole-body MPC with external contacts.",
+)
+
+Files = Annotated[list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files (YAML).", show_default=False)]
+ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (YAML).", show_default=False)]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
+Overrides = Annotated[
+    list[str],
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        default_factory=list,
+        help="Set a scenario key by its dotted path (lists by index), e.g. tasks.0.target.0=0.45; repeatable.",
+        show_default=False,
+    ),
+]
+Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
+
+
+def main() -> None:
+    """Entry point of `wbmpc`. Exit codes: 0 all passed, 1 a scenario failed, 2 bad input, 3 internal error."""
+    app()
+
+
+def _print_versions(wanted: bool) -> None:
+    if wanted:
+        from wbmpc.verdict import versions
+
+        for name, number in versions().items():
+            typer.echo(f"{name} {number}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_versions, is_eager=True, help="Versions of wbmpc and its solvers."),
+    ] = False,
+) -> None:
+    """Options before the command."""
+
+
+@app.command("run", help="Run scenarios; write DIR/NAME.rrd, DIR/NAME.json and DIR/junit.xml.")
+def run_command(
+    scenarios: Files,
+    overrides: Overrides,
+    out: Out = Path("out"),
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers [the scenario's].")] = None,
+    realtime: Annotated[bool, typer.Option("--realtime", help="Wall clock, the planner in its own thread.")] = False,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no .rrd file.")] = False,
+    counterfactuals: Annotated[
+        bool, typer.Option("--counterfactuals", help="Also run each scenario's counterfactuals.")
+    ] = False,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.run import RunOptions, run
+        from wbmpc.scenario import parse_overrides
+
+        options = RunOptions(
+            out=out,
+            overrides=parse_overrides(overrides),
+            seed=seed,
+            realtime=realtime,
+            record=not no_record,
+            counterfactuals=counterfactuals,
+            debug=debug,
+        )
+        return run(scenarios, options)
+
+    raise typer.Exit(guarded(work, traceback_path=out / "run.traceback.txt", debug=debug))
+
+
+@app.command("validate", help="Check scenario files without running them.")
+def validate_command(scenarios: Files, debug: Debug = False) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.validate import validate
+
+        return validate(scenarios)
+
+    raise typer.Exit(guarded(work, traceback_path=Path("validate.traceback.txt"), debug=debug))
+
+
+@app.command("schema", help="Print the JSON Schema of scenario files, for editors.")
+def schema_command(debug: Debug = False) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.validate import schema
+
+        return schema()
+
+    raise typer.Exit(guarded(work, traceback_path=Path("schema.traceback.txt"), debug=debug))
+
+
+@app.command("sweep", help="Run random draws over the ranges that the scenario declares; resumes after a kill.")
+def sweep_command(
+    scenario: ScenarioFile,
+    overrides: Overrides,
+    draws: Annotated[int, typer.Option("--draws", min=1, help="Number of draws.", show_default=False)],
+    jobs: Annotated[int | None, typer.Option(min=1, help="Parallel processes [one per core].")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the draws.")] = 0,
+    min_rate: Annotated[
+        float, typer.Option(min=0, max=1, help="Smallest share of passed draws for exit code 0.")
+    ] = 1.0,
+    out: Out = Path("out"),
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.sweep import SweepOptions, sweep
+        from wbmpc.scenario import parse_overrides
+
+        changes = parse_overrides(overrides)
+        options = SweepOptions(draws=draws, jobs=jobs, seed=seed, min_rate=min_rate, out=out, overrides=changes)
+        return sweep(scenario, options)
+
+    raise typer.Exit(guarded(work, traceback_path=out / "sweep.traceback.txt", debug=debug))
