@@ -102,6 +102,12 @@ class QuadraticProgram:
             return SolveStatus.INFEASIBLE
         return None
 
+    def binary_range(self) -> tuple[Vector, Vector]:
+        """Smallest and largest value, 0 or 1, that each binary's own bounds admit; (1, 0) when they admit neither."""
+        lower, upper = self.x_lower[self.binary], self.x_upper[self.binary]
+        zero, one = (lower <= 0.0) & (upper >= 0.0), (lower <= 1.0) & (upper >= 1.0)
+        return np.where(zero, 0.0, 1.0), np.where(one, 1.0, 0.0)
+
     def row_violation(self, x: Vector) -> Vector:
         """How far each row of A x lies outside its bounds, (m,), >= 0, in the rows' units."""
         value = self.matrix @ x

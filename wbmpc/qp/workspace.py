@@ -20,8 +20,35 @@ def _daqp(problem: QuadraticProgram) -> QpWorkspace:
     return DaqpWorkspace(problem)
 
 
-QP_BACKENDS: dict[str, Callable[[QuadraticProgram], QpWorkspace]] = {"daqp": _daqp}
-MIQP_BACKENDS: dict[str, Callable[[QuadraticProgram], QpWorkspace]] = {"daqp": _daqp}
+def _osqp(problem: QuadraticProgram) -> QpWorkspace:
+    from wbmpc.qp.osqp_workspace import OsqpWorkspace
+
+    return OsqpWorkspace(problem)
+
+
+def _daqp_mixed_integer(problem: QuadraticProgram) -> QpWorkspace:
+    from wbmpc.qp.daqp_mixed_integer import DaqpMixedInteger
+
+    return DaqpMixedInteger(problem)
+
+
+def _highs_mixed_integer(problem: QuadraticProgram) -> QpWorkspace:
+    from wbmpc.qp.highs_mixed_integer import HighsOuterApproximation
+
+    return HighsOuterApproximation(problem)
+
+
+Factory = Callable[[QuadraticProgram], QpWorkspace]
+QP_BACKENDS: dict[str, Factory] = {"daqp": _daqp, "osqp": _osqp}
+MIQP_BACKENDS: dict[str, Factory] = {"daqp": _daqp_mixed_integer, "highs": _highs_mixed_integer}
+_PREFIX = "qpsolvers:"  # "qpsolvers:daqp" is daqp through the wrapper
+
+
+def qp_backend_names() -> list[str]:
+    """Every name that `make_workspace` takes here: QP_BACKENDS and the solvers that qpsolvers finds installed."""
+    from wbmpc.qp.qpsolvers_workspace import installed_solvers
+
+    return [*QP_BACKENDS, *(_PREFIX + name for name in installed_solvers())]
 
 
 class UnknownBackendError(WbmpcError):
@@ -30,7 +57,7 @@ class UnknownBackendError(WbmpcError):
     def __init__(self, name: str, choices: list[str]) -> None:
         near = get_close_matches(name, choices, n=1)
         hint = f", did you mean '{near[0]}'?" if near else ""
-        super().__init__(f"unknown QP backend '{name}'{hint} Choices: {', '.join(choices)}")
+        super().__init__(f"unknown QP backend '{name}'{hint} (choices: {', '.join(choices)})")
 
 
 class MisplacedBinariesError(WbmpcError):
@@ -38,7 +65,7 @@ class MisplacedBinariesError(WbmpcError):
 
 
 def make_workspace(backend: str, problem: QuadraticProgram) -> QpWorkspace:
-    """A workspace of one of QP_BACKENDS, bound to `problem`.
+    """A workspace bound to `problem`: one of QP_BACKENDS, or any solver of qpsolvers with or without "qpsolvers:".
 
     Raises:
         UnknownBackendError: no such backend, with the choices and a near miss.
@@ -46,13 +73,18 @@ def make_workspace(backend: str, problem: QuadraticProgram) -> QpWorkspace:
     """
     if problem.binary.size:
         raise MisplacedBinariesError(f"{problem.binary.size} binary variables need one of {', '.join(MIQP_BACKENDS)}")
-    if backend not in QP_BACKENDS:
-        raise UnknownBackendError(backend, list(QP_BACKENDS))
-    return QP_BACKENDS[backend](problem)
+    if backend in QP_BACKENDS:
+        return QP_BACKENDS[backend](problem)
+    from wbmpc.qp.qpsolvers_workspace import QpsolversWorkspace, installed_solvers
+
+    solver = backend.removeprefix(_PREFIX)
+    if solver not in installed_solvers():
+        raise UnknownBackendError(backend, qp_backend_names())
+    return QpsolversWorkspace(problem, solver)
 
 
 def make_mip_workspace(backend: str, problem: QuadraticProgram) -> QpWorkspace:
-    """A workspace of one of MIQP_BACKENDS, bound to `problem`; exact up to the backend's node limit.
+    """A workspace of one of MIQP_BACKENDS, bound to `problem`; exact.
 
     Raises:
         UnknownBackendError: no such backend, with the choices and a near miss.
