@@ -57,7 +57,7 @@ class Verdict:
             "versions": dict(self.versions),
             "state_sha256": self.state_sha256,
         }
-        return _finite(document)
+        return finite(document)
 
     def write(self, path: Path) -> None:
         """Write the JSON document to `path`, whole or not at all."""
@@ -104,12 +104,12 @@ def _row(times: Vector, failures: int) -> dict[str, float]:
     return {"solves": int(times.size), "failures": failures, "p50": p50, "p99": p99, "max": most}
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """The value with every nan and inf replaced by None, which JSON can say."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value

@@ -15,6 +15,7 @@ from wbmpc.checks.reach import BraceForceCheck, ComBeyondToesCheck, ReachCheck
 from wbmpc.checks.result import CheckResult, failed
 from wbmpc.checks.settings import CheckSettings, UniversalSettings
 from wbmpc.checks.solvers import SolverFailuresCheck
+from wbmpc.strict import StrictModel
 
 
 class Check(Protocol):
@@ -46,26 +47,29 @@ CHECKS: dict[str, Any] = {  # kind -> class; a class takes its own settings mode
 }
 
 
-def universal_checks(universal: UniversalSettings) -> list[CheckSettings]:
-    """The universal checks with their settings, in the order of the schema."""
-    return [getattr(universal, field) for field in UniversalSettings.model_fields]
-
-
 def evaluate_checks(
     context: CheckContext, *, universal: UniversalSettings, checks: Sequence[CheckSettings]
 ) -> list[CheckResult]:
-    """Every check of a run. Names are unique: a second check of one kind without a name gets `kind_2`."""
+    """Every check of a run: the universal ones under their kind, then `checks` under their name or kind.
+
+    Names are unique: a second check of one name gets `name_2`.
+    """
+    configs = [(field, getattr(universal, field)) for field in UniversalSettings.model_fields]
+    configs += [(config.name or _kind(config), config) for config in checks]
     results: list[CheckResult] = []
     used: set[str] = set()
-    for config in [*universal_checks(universal), *checks]:
-        kind: str = config.kind  # type: ignore[attr-defined]
-        name = _unused(config.name or kind, used)
+    for wanted, config in configs:
+        name = _unused(wanted, used)
         if context.recorder.ticks == 0:
             results.append(failed(name, 0.0, "1", "the run has no ticks"))
         else:
-            check: Check = CHECKS[kind](config)
+            check: Check = CHECKS[_kind(config)](config)
             results.append(check.evaluate(context, name))
     return results
+
+
+def _kind(config: StrictModel) -> str:
+    return str(config.kind)  # type: ignore[attr-defined]  # every member of the unions has one
 
 
 def _unused(name: str, used: set[str]) -> str:

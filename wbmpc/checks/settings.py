@@ -13,7 +13,7 @@ from wbmpc.strict import NonNegative, Positive, StrictModel
 
 
 class CheckSettings(StrictModel):
-    """Common to all checks."""
+    """Common to the checks that a scenario lists."""
 
     name: str | None = Field(default=None, min_length=1, description="name in the results; default: the kind")
 
@@ -21,13 +21,13 @@ class CheckSettings(StrictModel):
 # --- universal: on in every scenario, thresholds settable -----------------------------------------------------------
 
 
-class Completed(CheckSettings):
+class Completed(StrictModel):
     """The run reached its full duration with a finite state."""
 
     kind: Literal["completed"] = "completed"
 
 
-class NoFall(CheckSettings):
+class NoFall(StrictModel):
     """The torso stays up and the CoM stays high, at every tick."""
 
     kind: Literal["no_fall"] = "no_fall"
@@ -35,7 +35,7 @@ class NoFall(CheckSettings):
     min_com_height: NonNegative = Field(default=0.12, description="[m] smallest CoM height over the lower sole")
 
 
-class DeclaredContacts(CheckSettings):
+class DeclaredContacts(StrictModel):
     """Only feet touch the world, and a palm only the object of its chosen patch; the robot never touches itself."""
 
     kind: Literal["declared_contacts"] = "declared_contacts"
@@ -43,35 +43,35 @@ class DeclaredContacts(CheckSettings):
     release_time: NonNegative = Field(default=0.5, description="[s] a palm may still touch so long after its release")
 
 
-class Penetration(CheckSettings):
+class Penetration(StrictModel):
     """No contact is deeper than `max`."""
 
     kind: Literal["penetration"] = "penetration"
     max: Positive = Field(default=0.002, description="[m]")
 
 
-class TorqueLimit(CheckSettings):
+class TorqueLimit(StrictModel):
     """The applied torque never exceeds what the servo can give at that speed, in that direction."""
 
     kind: Literal["torque_limit"] = "torque_limit"
     max: Positive = Field(default=1.0, description="largest |torque| / limit")
 
 
-class SpeedLimit(CheckSettings):
+class SpeedLimit(StrictModel):
     """No joint turns faster than its servo's no-load speed."""
 
     kind: Literal["speed_limit"] = "speed_limit"
     max: Positive = Field(default=1.0, description="largest |speed| / no-load speed")
 
 
-class SolverFailures(CheckSettings):
+class SolverFailures(StrictModel):
     """Few solves fail: tracker fallbacks and failed stages, each as a share of its own number of solves."""
 
     kind: Literal["solver_failures"] = "solver_failures"
     max: NonNegative = Field(default=0.01, le=1, description="largest share of failed solves")
 
 
-class MomentumBalance(CheckSettings):
+class MomentumBalance(StrictModel):
     """The contact forces and the declared disturbances explain the CoM's motion: no hidden support exists."""
 
     kind: Literal["momentum_balance"] = "momentum_balance"
