@@ -1,0 +1,48 @@
+"""Scenarios: YAML files -> typed, strict, located settings -> the MuJoCo world of a run."""
+
+from wbmpc.scenario.consistency import check_names
+from wbmpc.scenario.json_schema import scenario_json_schema
+from wbmpc.scenario.load import counterfactual, load_scenario, robot_path, vary
+from wbmpc.scenario.overrides import apply_overrides, parse_overrides
+from wbmpc.scenario.patches import PatchPose, resolve_patches
+from wbmpc.scenario.schema.experiments import Counterfactual, Sweep, Variation
+from wbmpc.scenario.schema.loop import InitialState, LoopSettings, RecordingSettings
+from wbmpc.scenario.schema.plant import Disturbance, Impulse, PlantSettings, SensorSettings
+from wbmpc.scenario.schema.scenario import Scenario
+from wbmpc.scenario.schema.tasks import ComHeightTask, HeightWaypoint, ReachTask, StandTask, Task
+from wbmpc.scenario.schema.world import Box, Floor, Patch, World
+from wbmpc.scenario.world import build_world
+
+__all__ = [
+    "Box",
+    "ComHeightTask",
+    "Counterfactual",
+    "Disturbance",
+    "Floor",
+    "HeightWaypoint",
+    "Impulse",
+    "InitialState",
+    "LoopSettings",
+    "Patch",
+    "PatchPose",
+    "PlantSettings",
+    "ReachTask",
+    "RecordingSettings",
+    "Scenario",
+    "SensorSettings",
+    "StandTask",
+    "Sweep",
+    "Task",
+    "Variation",
+    "World",
+    "apply_overrides",
+    "build_world",
+    "check_names",
+    "counterfactual",
+    "load_scenario",
+    "parse_overrides",
+    "resolve_patches",
+    "robot_path",
+    "scenario_json_schema",
+    "vary",
+]

@@ -1,0 +1,143 @@
+"""What no single field can say: names that must exist, times that must fit, rates that must divide."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator
+
+from wbmpc.checks.settings import ContactPatches, Reach, UniversalSettings
+from wbmpc.scenario.diagnosis import Finding
+from wbmpc.scenario.patches import FACES
+from wbmpc.scenario.robot_file import RobotNames
+from wbmpc.scenario.schema.scenario import Scenario
+from wbmpc.scenario.schema.tasks import ComHeightTask, ReachTask, StandTask
+from wbmpc.scenario.wording import KeyPath, describe, near_misses
+
+FLOOR = "floor"
+
+
+def find_inconsistencies(scenario: Scenario) -> list[Finding]:
+    """Every contradiction between the fields of one scenario; counterfactuals and sweep are looked at elsewhere."""
+    return [*_objects_and_patches(scenario), *_times(scenario), *_rates(scenario), *_checks(scenario)]
+
+
+def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Finding]:
+    """Every name that the robot model does not have, or that it has already."""
+    yield from _must_exist(("initial", "keyframe"), scenario.initial.keyframe, robot.keyframes, "keyframe")
+    for joint in scenario.initial.joints:
+        yield from _must_exist(("initial", "joints", joint), joint, robot.joints, "joint", at_key=True)
+    for body in scenario.plant.body_mass_scale:
+        yield from _must_exist(("plant", "body_mass_scale", body), body, robot.bodies, "body", at_key=True)
+    for index, disturbance in enumerate(scenario.disturbances):
+        yield from _must_exist(("disturbances", index, "body"), disturbance.body, robot.bodies, "body")
+    for name in scenario.world.objects:
+        if name in robot.geoms:
+            yield Finding(("world", "objects", name), "the robot has a geom of this name", at_key=True)
+
+
+def check_names(scenario: Scenario) -> tuple[str, ...]:
+    """Names of all checks of a run as results show them: the universal ones, then the scenario's own."""
+    universal = (getattr(scenario.universal, field) for field in UniversalSettings.model_fields)
+    return tuple(check.name or check.kind for check in (*universal, *scenario.checks))
+
+
+def _must_exist(
+    path: KeyPath, name: str, choices: Iterable[str], what: str, *, at_key: bool = False
+) -> Iterator[Finding]:
+    choices = list(choices)
+    if name not in choices:
+        yield Finding(path, f"no {what} '{name}'" + near_misses(name, choices), at_key)
+
+
+def _objects_and_patches(scenario: Scenario) -> Iterator[Finding]:
+    objects = scenario.world.objects
+    if FLOOR in objects:
+        yield Finding(("world", "objects", FLOOR), "the name 'floor' is taken by the floor itself", at_key=True)
+    for name, patch in scenario.patches.items():
+        path: KeyPath = ("patches", name)
+        if patch.on not in objects:
+            yield from _must_exist((*path, "on"), patch.on, objects, "object")
+            continue
+        for component, axis in enumerate(FACES[patch.face].plane_axes):
+            half = objects[patch.on].size[axis] / 2
+            if abs(patch.offset[component]) > half:
+                yield Finding(
+                    (*path, "offset", component),
+                    f"off the face: {patch.offset[component]:g} m from the centre, the face ends at {half:g} m",
+                )
+
+
+def _times(scenario: Scenario) -> Iterator[Finding]:
+    horizon = scenario.planner.horizon_steps * scenario.planner.horizon_step
+    if horizon > scenario.duration:
+        message = f"the horizon of {horizon:g} s is longer than the run of {scenario.duration:g} s"
+        yield Finding(("planner", "horizon_steps"), message)
+    for index, task in enumerate(scenario.tasks):
+        path: KeyPath = ("tasks", index)
+        if isinstance(task, StandTask):
+            continue
+        if isinstance(task, ReachTask) and task.arrive_by <= task.start:
+            message = f"must be later than start ({task.start:g} s), got {task.arrive_by:g} s"
+            yield Finding((*path, "arrive_by"), message)
+        elif isinstance(task, ComHeightTask):
+            yield from _waypoint_order(path, task)
+        if task.end > scenario.duration:
+            yield Finding(path, f"ends at {task.end:g} s, the run already at {scenario.duration:g} s (duration)")
+    heights = [index for index, task in enumerate(scenario.tasks) if isinstance(task, ComHeightTask)]
+    if len(heights) > 1:
+        yield Finding(("tasks", heights[1]), f"a second com_height task, first is tasks.{heights[0]}")
+    for index, disturbance in enumerate(scenario.disturbances):
+        if disturbance.end > scenario.duration:
+            message = f"ends at {disturbance.end:g} s, the run already at {scenario.duration:g} s (duration)"
+            yield Finding(("disturbances", index, "time"), message)
+
+
+def _waypoint_order(path: KeyPath, task: ComHeightTask) -> Iterator[Finding]:
+    times = [waypoint.time for waypoint in task.waypoints]
+    for index, (before, after) in enumerate(itertools.pairwise(times), start=1):
+        if after <= before:
+            message = f"must be later than the waypoint before it ({before:g} s), got {after:g} s"
+            yield Finding((*path, "waypoints", index, "time"), message)
+
+
+def _rates(scenario: Scenario) -> Iterator[Finding]:
+    loop = scenario.loop
+    rates: list[tuple[KeyPath, int]] = [
+        (("loop", "planner_rate"), loop.planner_rate),
+        (("recording", "rate"), scenario.recording.rate),
+    ]
+    for path, rate in rates:
+        if loop.physics_rate % rate:
+            yield Finding(path, f"{rate} Hz does not divide loop.physics_rate ({loop.physics_rate} Hz)")
+    times: list[tuple[KeyPath, float]] = [
+        (("loop", "planner_delay"), loop.planner_delay),
+        (("duration",), scenario.duration),
+    ]
+    for path, time in times:
+        ticks = time * loop.physics_rate
+        if not math.isclose(ticks, round(ticks), rel_tol=1e-9, abs_tol=1e-9):
+            yield Finding(path, f"{time:g} s is not a whole number of physics steps (1/{loop.physics_rate} s)")
+    horizon = scenario.planner.horizon_steps * scenario.planner.horizon_step
+    if horizon < loop.planner_delay + 1 / loop.planner_rate:
+        message = f"the horizon of {horizon:g} s ends before the next plan can take effect"
+        yield Finding(("planner", "horizon_steps"), message)
+
+
+def _checks(scenario: Scenario) -> Iterator[Finding]:
+    names = check_names(scenario)
+    universal = len(names) - len(scenario.checks)
+    has_reach = any(isinstance(task, ReachTask) for task in scenario.tasks)
+    for index, check in enumerate(scenario.checks):
+        path: KeyPath = ("checks", index)
+        name = names[universal + index]
+        if name in names[: universal + index]:
+            key = "name" if check.name else "kind"
+            yield Finding((*path, key), f"a second check called '{name}', give it a name of its own (key 'name')")
+        if isinstance(check, Reach) and check.target is None and not has_reach:
+            yield Finding((*path, "kind"), "needs a reach task or a target")
+        if isinstance(check, ContactPatches):
+            for position, patch in enumerate(check.allowed or ()):
+                yield from _must_exist((*path, "allowed", position), patch, scenario.patches, "patch")
+            if check.max_count is not None and check.max_count < check.min_count:
+                yield Finding((*path, "max_count"), f"less than min_count ({describe(check.min_count)})")

@@ -1,0 +1,66 @@
+"""The `world:` and `patches:` blocks: what exists around the robot, and where a hand could brace."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from wbmpc.strict import Fraction, Friction, Identifier, NonNegative, Positive, StrictModel, Vector2
+
+Face = Literal["top", "bottom", "front", "back", "left", "right"]
+Colour = tuple[Fraction, Fraction, Fraction, Fraction]
+
+
+class Floor(StrictModel):
+    """The floor: the plane z = 0."""
+
+    friction: Friction = Field(default=0.8, description="Coulomb friction coefficient [-].")
+
+
+class Box(StrictModel):
+    """A fixed box. It is placed by its underside, so that changing `size.2` alone makes a table higher."""
+
+    kind: Literal["box"] = Field(description="A fixed box: table, wall, step.")
+    size: tuple[Positive, Positive, Positive] = Field(description="Edge lengths along the box's own x, y, z [m].")
+    position: Vector2 = Field(description="Centre of the box in the horizontal plane: world x, y [m].")
+    bottom: NonNegative = Field(default=0.0, description="Height of the underside above the floor [m].")
+    yaw: float = Field(default=0.0, description="Rotation about the world's z axis [rad].")
+    friction: Friction = Field(default=0.8, description="Coulomb friction coefficient [-].")
+    color: Colour = Field(default=(0.72, 0.53, 0.35, 1.0), description="Red, green, blue, opacity, each 0 to 1 [-].")
+    present: bool = Field(
+        default=True,
+        description="false: the planner still believes in the box and its patches, but the world does not contain it.",
+    )
+
+    @property
+    def centre(self) -> tuple[float, float, float]:
+        """Centre of the box in world [m]."""
+        return (self.position[0], self.position[1], self.bottom + self.size[2] / 2)
+
+
+# One kind only for now: a second one makes this `Annotated[Box | Other, Field(discriminator="kind")]`.
+WorldObject = Box
+
+
+class World(StrictModel):
+    """Everything around the robot."""
+
+    floor: Floor = Field(default=Floor(), description="The floor, z = 0.")
+    objects: dict[Identifier, WorldObject] = Field(default={}, description="Objects by name.")
+
+
+class Patch(StrictModel):
+    """A place on an object where a palm could press: a candidate for stage 3, never a command to use it.
+
+    `offset` runs along two of the box's own axes: (x, y) on top and bottom, (y, z) on front (+x) and back (−x),
+    (x, z) on left (+y) and right (−y).
+    """
+
+    on: str = Field(min_length=1, description="Name of the object.")
+    face: Face = Field(
+        default="top", description="Face in the object's own frame: front +x, back −x, left +y, right −y, top +z."
+    )
+    offset: Vector2 = Field(default=(0.0, 0.0), description="From the face's centre, along the face's two axes [m].")
+    friction: Friction = Field(default=0.5, description="Friction coefficient that the planner counts on [-].")
+    force_cap: Positive = Field(default=15.0, description="Largest normal force that the planner may ask for [N].")
