@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from wbmpc.scenario import Counterfactual
 from wbmpc.verdict import Verdict
-
-if TYPE_CHECKING:
-    from wbmpc.scenario.schema.experiments import Counterfactual
 
 
 def objection(counterfactual: Counterfactual, verdict: Verdict) -> str | None:

@@ -13,17 +13,15 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from pydantic import JsonValue
 
 from wbmpc.errors import WbmpcError
+from wbmpc.scenario import Scenario, Variation, load_scenario, vary
 from wbmpc.sweep_journal import Journal
 from wbmpc.verdict import Verdict, finite
-
-if TYPE_CHECKING:
-    from wbmpc.scenario.schema.experiments import Variation
 
 DIGITS = 6  # significant digits of a drawn number: what the reproduce command shows is what ran
 
@@ -52,16 +50,23 @@ def draw_values(variations: Sequence[Variation], *, seed: int, index: int) -> tu
     return values, int(rng.integers(2**31))
 
 
+def scenario_of(scenario: Scenario, draw: Draw) -> Scenario:
+    """The scenario of one draw, with the sweep's own checks where it declares some.
+
+    Raises:
+        ScenarioError: the drawn values do not make a valid scenario together.
+    """
+    checks = scenario.sweep.checks if scenario.sweep else None
+    return vary(scenario, {**draw.values, "seed": draw.seed}, checks=checks)
+
+
 def run_draw(draw: Draw) -> dict[str, Any]:
     """Run one draw; the row of the journal. Nothing in it depends on time or machine load."""
-    from wbmpc.scenario import load_scenario
-    from wbmpc.session import run_scenario
+    from wbmpc.session import run_scenario  # MuJoCo, Pinocchio and the solvers: only when something runs
 
     row: dict[str, Any] = {"draw": draw.index, "seed": draw.seed, "set": dict(draw.values)}
     try:
-        scenario = load_scenario(draw.path, {**draw.overrides, **draw.values}, draw.seed)
-        if scenario.sweep is not None and scenario.sweep.checks is not None:
-            scenario = scenario.model_copy(update={"checks": scenario.sweep.checks})
+        scenario = scenario_of(load_scenario(draw.path, draw.overrides), draw)
         verdict = run_scenario(scenario, name=scenario.name, recording=None).verdict
     except WbmpcError:
         raise
@@ -147,12 +152,12 @@ def source_hash(root: Path | None = None) -> str:
     return digest.hexdigest()
 
 
-def header_of(path: Path, *, seed: int, overrides: Mapping[str, JsonValue], robot: Path | None) -> dict[str, Any]:
+def header_of(path: Path, *, seed: int, overrides: Mapping[str, JsonValue], robot: Path) -> dict[str, Any]:
     """What must be equal for a journal to be continued."""
     return {
         "format": 1,
         "scenario_sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
-        "robot_sha256": hashlib.sha256(robot.read_bytes()).hexdigest() if robot else None,
+        "robot_sha256": hashlib.sha256(robot.read_bytes()).hexdigest(),
         "source_sha256": source_hash(),
         "seed": seed,
         "set": json.loads(json.dumps(dict(overrides))),

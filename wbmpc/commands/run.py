@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from pydantic import JsonValue
 
@@ -13,14 +12,10 @@ from wbmpc.commands.exits import ExitCode, report_internal_error
 from wbmpc.commands.progress import simulated_time
 from wbmpc.commands.tables import final_line, print_checks
 from wbmpc.counterfactuals import objection
-from wbmpc.errors import Problem, ScenarioError, WbmpcError
+from wbmpc.errors import WbmpcError
 from wbmpc.junit import Case, Suite, case_of, write_junit
-from wbmpc.scenario import load_scenario
+from wbmpc.scenario import Counterfactual, Scenario, counterfactual, load_scenario
 from wbmpc.verdict import Verdict
-
-if TYPE_CHECKING:
-    from wbmpc.scenario.schema.experiments import Counterfactual
-    from wbmpc.scenario.schema.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,15 +71,10 @@ def jobs_of(path: Path, options: RunOptions) -> list[Job]:
     scenario = load_scenario(path, options.overrides, options.seed)
     jobs = [Job(scenario.name, scenario, None)]
     if options.counterfactuals:
-        for name, counterfactual in scenario.counterfactuals.items():
-            try:
-                changed = load_scenario(path, {**options.overrides, **counterfactual.set}, options.seed)
-            except ScenarioError as error:
-                raise ScenarioError(
-                    Problem(p.place, f"counterfactuals.{name}: {p.message}", p.excerpt) for p in error.problems
-                ) from None
-            changed = changed.model_copy(update={"checks": (*changed.checks, *counterfactual.checks)})
-            jobs.append(Job(f"{scenario.name}.{name}", changed, counterfactual))
+        jobs += [
+            Job(f"{scenario.name}.{name}", counterfactual(scenario, name), declared)
+            for name, declared in scenario.counterfactuals.items()
+        ]
     return jobs
 
 

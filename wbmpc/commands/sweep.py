@@ -22,9 +22,8 @@ from wbmpc.commands.progress import counted
 from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import console, number
 from wbmpc.errors import WbmpcError
-from wbmpc.scenario import load_scenario
-from wbmpc.scenario.robot_file import find_robot
-from wbmpc.sweep import Draw, draw_values, header_of, run_draws, severity
+from wbmpc.scenario import load_scenario, robot_path
+from wbmpc.sweep import Draw, draw_values, header_of, run_draws, scenario_of, severity
 from wbmpc.sweep_journal import Journal
 from wbmpc.verdict import versions, write_json
 
@@ -60,10 +59,9 @@ def sweep(path: Path, options: SweepOptions) -> ExitCode:
         values, seed = draw_values(variations, seed=options.seed, index=index)
         draws.append(Draw(index, str(path), seed, values, options.overrides))
     for draw in draws:
-        load_scenario(path, {**draw.overrides, **draw.values}, draw.seed)  # a bad draw is known before hours of runs
+        scenario_of(scenario, draw)  # a bad draw is known before hours of runs
     make_folder(options.out)
-    robot = find_robot(scenario.robot, scenario_directory=path.parent)
-    header = header_of(path, seed=options.seed, overrides=options.overrides, robot=robot)
+    header = header_of(path, seed=options.seed, overrides=options.overrides, robot=robot_path(scenario))
     journal = Journal(options.out / f"{scenario.name}.sweep.jsonl", header)
     done = sum(row["draw"] < options.draws for row in journal.rows)
     if done:

@@ -1,0 +1,36 @@
+"""The numbers of a run that every scenario has, whatever it checks: `metrics` of NAME.json, see docs/results.md."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.checks.contacts import hand_contact_starts
+from wbmpc.checks.context import CheckContext
+from wbmpc.signals import SolveStatus
+
+
+def metrics_of(context: CheckContext) -> dict[str, float]:
+    """Metrics by name, in SI units; nan where a run has no such thing."""
+    recorder, facts = context.recorder, context.facts
+    if recorder.ticks == 0:
+        return {"simulated_time": 0.0}
+    depth = -recorder.contacts.distance
+    palm_push = np.linalg.norm(context.palm_force, axis=2)  # (n, 2)
+    stage3 = sum(plan.stage3.status != SolveStatus.NOT_RUN for plan in recorder.plans)
+    starts = hand_contact_starts(context)
+    return {
+        "simulated_time": recorder.ticks * facts.timestep,
+        "robot_mass": facts.mass,
+        "com_height_min": float(recorder.com[:, 2].min()),
+        "com_height_max": float(recorder.com[:, 2].max()),
+        "com_speed_max": float(np.linalg.norm(recorder.com_velocity, axis=1).max()),
+        "torso_up_min": float(recorder.torso_up.min()),
+        "torque_peak_fraction": float((np.abs(recorder.torque) / facts.stall_torque).max()),
+        "speed_peak_fraction": float((np.abs(recorder.qvel[:, 6:]) / facts.no_load_speed).max()),
+        "penetration_max": float(max(depth.max(initial=0.0), 0.0)),
+        "hand_force_max": float(palm_push.max()),
+        "hand_contacts": float(len(starts)),
+        "first_hand_contact": starts[0] if starts else np.nan,
+        "plans": float(len(recorder.plans)),
+        "stage3_plans": float(stage3),
+    }
