@@ -48,5 +48,5 @@ class DaqpMixedInteger:
         _, x, status, iterations = solve_cold(convex, sense)
         if status is not SolveStatus.SOLVED:
             return failed(problem, status, iterations, perf_counter() - start)
-        x[binary] = np.rint(x[binary])
+        x[binary] = np.rint(x[binary]) + 0.0  # no -0.0
         return QpSolution(x, status, iterations, perf_counter() - start)

@@ -24,7 +24,7 @@ _STATUS = {
     -3: SolveStatus.NUMERICAL_ERROR,  # unbounded
     -4: SolveStatus.ITERATION_LIMIT,
     -5: SolveStatus.NUMERICAL_ERROR,  # Hessian not positive definite
-    -6: SolveStatus.NUMERICAL_ERROR,  # initial working set overdetermined
+    -6: SolveStatus.INFEASIBLE,  # equalities that contradict each other; redundant ones are dropped
 }
 
 

@@ -51,7 +51,7 @@ class HighsOuterApproximation:
         status, best, rounds = self._approximate()
         if best is None:
             return failed(problem, status, rounds, perf_counter() - start)
-        best[binary] = np.rint(best[binary])
+        best[binary] = np.rint(best[binary]) + 0.0  # no -0.0
         return QpSolution(best[: problem.variables].copy(), status, rounds, perf_counter() - start)
 
     def _approximate(self) -> tuple[SolveStatus, Vector | None, int]:

@@ -15,7 +15,6 @@ from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
 from wbmpc.signals import SolveStatus, Vector
 
-
 # Solvers whose default accuracy (1e-3) is too coarse to compare with the others.
 _SETTINGS: dict[str, dict[str, Any]] = {
     "osqp": {"eps_abs": 1e-7, "eps_rel": 1e-7, "polishing": True, "max_iter": 20_000, "adaptive_rho": 1},
@@ -37,7 +36,7 @@ class QpsolversWorkspace:
         self._last: Vector | None = None
 
     def solve(self, *, matrices_changed: bool = True) -> QpSolution:
-        """See `QpWorkspace.solve`. qpsolvers tells only whether a solution was found; a linear program tells why not."""
+        """See `QpWorkspace.solve`. A linear program tells infeasible problems from failures of the solver."""
         start = perf_counter()
         defect = self.problem.defect()
         if defect is not None:
@@ -45,7 +44,7 @@ class QpsolversWorkspace:
         self._form.refresh()
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # what they say arrives as a status
+                warnings.simplefilter("ignore")  # what they say arrives as a status
                 solution = qpsolvers.solve_problem(
                     self._build(), solver=self._solver, initvals=self._last, **_SETTINGS.get(self._solver, {})
                 )
