@@ -307,9 +307,17 @@ def test_stretched_arm_is_free_of_self_collision(
 
 
 def test_bodies_do_collide(mj_model: mujoco.MjModel, robot: Robot) -> None:
-    """The tests above could not fail if the collision geoms were switched off: a hand through the chest must show."""
-    angles = {"right_shoulder_yaw": 1.4, "right_elbow": -2.2, "right_shoulder_pitch": 0.0, "right_shoulder_roll": 0.0}
-    assert _contacts(mj_model, robot, _posture(robot, **angles)) != []
+    """The tests above could not fail if the collision geoms were switched off: a hand in the chest must show."""
+    angles = {"right_shoulder_pitch": -0.6, "right_shoulder_yaw": 1.5, "right_elbow": -2.2}
+    pairs = _contacts(mj_model, robot, _posture(robot, **angles))
+    assert {"chest", "right_palm_geom"} in [set(pair) for pair in pairs]
+
+
+def test_every_limb_has_a_geom_that_collides(mj_model: mujoco.MjModel) -> None:
+    collides = {mj_model.geom(i).name for i in np.flatnonzero(mj_model.geom_contype & mj_model.geom_conaffinity)}
+    per_side = ("thigh", "shank", "foot", "shoulder", "upper_arm", "forearm", "palm_geom")
+    limbs = {f"{side}_{limb}" for side in SIDES for limb in per_side}
+    assert collides == limbs | {"pelvis_hull", "belly", "chest", "backpack", "head"}
 
 
 def test_only_neighbours_are_excluded_from_collision(mj_model: mujoco.MjModel) -> None:

@@ -8,7 +8,6 @@ import pinocchio as pin
 from wbmpc.robot import Robot
 from wbmpc.signals import GRAVITY, Vector
 
-_GRAVITY_IN_WORLD = np.array([0.0, 0.0, -GRAVITY])
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -79,7 +78,9 @@ class Kinematics:
     @property
     def com_drift(self) -> Vector:
         """J̇ v (3,): the CoM's acceleration at v̇ = 0 [m/s²]."""
-        return self._base_bias_force() / self.robot.mass + _GRAVITY_IN_WORLD
+        drift = self._data.oMi[1].rotation @ self._dynamic_data.nle[:3] / self.robot.mass
+        drift[2] -= GRAVITY
+        return np.asarray(drift)
 
     @property
     def mass_matrix(self) -> Vector:
@@ -103,13 +104,11 @@ class Kinematics:
         Read off the base rows of the bias: at v̇ = 0 they are the wrench that gives the robot this momentum rate in
         gravity, and gravity has no moment about the CoM. Costs nothing; Ȧ itself would be another recursion.
         """
-        force = self._base_bias_force()
         base = self._data.oMi[1]
-        moment = base.rotation @ self._dynamic_data.nle[3:6] - np.cross(self._data.com[0] - base.translation, force)
-        return np.concatenate((force + self.robot.mass * _GRAVITY_IN_WORLD, moment))
-
-    def _base_bias_force(self) -> Vector:
-        return np.asarray(self._data.oMi[1].rotation @ self._dynamic_data.nle[:3])
+        about_com = pin.SE3(base.rotation, base.translation - self._data.com[0])
+        wrench = about_com.act(pin.Force(self._dynamic_data.nle[:6])).vector
+        wrench[2] -= self.robot.mass * GRAVITY
+        return np.array(wrench)
 
     @property
     def _dynamic_data(self) -> pin.Data:

@@ -148,14 +148,14 @@ class Robot:
         """Pinocchio acceleration v̇ (nv,) of MuJoCo's: the base frame turns under the velocity, hence −ω × (Rᵀ ṗ)."""
         a = np.array(qacc, dtype=np.float64)
         world_to_base = Robot.base_rotation(qpos).T
-        a[:3] = world_to_base @ qacc[:3] - np.cross(qvel[3:6], world_to_base @ qvel[:3])
+        a[:3] = world_to_base @ qacc[:3] - pin.skew(qvel[3:6]) @ world_to_base @ qvel[:3]
         return a
 
     @staticmethod
     def qacc_from_a(qpos: Vector, v: Vector, a: Vector) -> Vector:
         """MuJoCo acceleration (nv,) of Pinocchio's velocity and acceleration, see `a_from_qacc`."""
         qacc = np.array(a, dtype=np.float64)
-        qacc[:3] = Robot.base_rotation(qpos) @ (a[:3] + np.cross(v[3:6], v[:3]))
+        qacc[:3] = Robot.base_rotation(qpos) @ (a[:3] + pin.skew(v[3:6]) @ v[:3])
         return qacc
 
     @staticmethod
