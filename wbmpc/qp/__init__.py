@@ -8,6 +8,7 @@ from wbmpc.qp.workspace import (
     QpWorkspace,
     make_mip_workspace,
     make_workspace,
+    qp_backend_names,
 )
 
 __all__ = [
@@ -19,5 +20,6 @@ __all__ = [
     "load_instance",
     "make_mip_workspace",
     "make_workspace",
+    "qp_backend_names",
     "save_instance",
 ]

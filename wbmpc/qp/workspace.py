@@ -9,7 +9,15 @@ from wbmpc.errors import WbmpcError
 from wbmpc.qp.problem import QuadraticProgram
 from wbmpc.qp.solution import QpSolution, QpWorkspace
 
-__all__ = ["MIQP_BACKENDS", "QP_BACKENDS", "QpSolution", "QpWorkspace", "make_mip_workspace", "make_workspace"]
+__all__ = [
+    "MIQP_BACKENDS",
+    "QP_BACKENDS",
+    "QpSolution",
+    "QpWorkspace",
+    "make_mip_workspace",
+    "make_workspace",
+    "qp_backend_names",
+]
 
 # Each factory imports its solver on first use: osqp, highspy and qpsolvers take a second to load together.
 

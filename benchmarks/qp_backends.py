@@ -1,0 +1,202 @@
+"""Solve times of the QP backends, interleaved in one run so that a noisy machine disturbs all alike.
+
+    python benchmarks/qp_backends.py [--steps 200] [--backends daqp,osqp] [--instances DIR]
+
+Each family is a slowly changing sequence, as a control loop sees it: every matrix changes at every step, and each
+workspace warm-starts from its own last solve. Trust the ratios to daqp: the others evict its caches, so that alone it
+is up to twice as fast as shown.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import daqp
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from wbmpc.qp import MIQP_BACKENDS, QuadraticProgram, load_instance, make_mip_workspace, make_workspace
+from wbmpc.qp.daqp_workspace import soft_sense
+from wbmpc.qp.workspace import qp_backend_names
+from wbmpc.signals import SolveStatus
+
+Fill = Callable[[QuadraticProgram, int], None]  # writes the problem of one step
+ONE_SHOT = "daqp.solve, one-shot"
+VECTORS = "daqp, same matrices"
+
+
+@dataclass
+class Family:
+    """A named sequence of problems of one shape."""
+
+    name: str
+    problem: QuadraticProgram
+    fill: Fill
+
+
+@dataclass
+class Samples:
+    """What one backend did on one family."""
+
+    seconds: list[float] = field(default_factory=list)
+    iterations: list[int] = field(default_factory=list)
+    failures: int = 0
+
+
+def drifting(name: str, variables: int, rows: int, *, equalities: int, soft: int) -> Family:
+    """Random least-squares tasks with rows around a moving feasible point; the last `soft` rows are soft."""
+    rng = np.random.default_rng(0)
+    tasks, task_drift = rng.normal(size=(2, 2 * variables // 3, variables))
+    matrix, matrix_drift = rng.normal(size=(2, rows, variables))
+    target, target_drift, inside, inside_drift = rng.normal(size=(4, variables))
+    width, reach = rng.uniform(0.05, 2.0, rows), rng.uniform(0.5, 3.0, variables)
+    weight = np.concatenate([np.zeros(rows - soft), np.full(soft, 1e4)])
+
+    def fill(problem: QuadraticProgram, step: int) -> None:
+        phase = np.sin(0.01 * step)
+        jacobian = tasks + 0.3 * phase * task_drift
+        point = inside + phase * inside_drift
+        problem.hessian[:] = jacobian.T @ jacobian + 1e-3 * np.eye(variables)
+        problem.gradient[:] = 3.0 * (target + phase * target_drift)
+        problem.matrix[:] = matrix + 0.3 * phase * matrix_drift
+        value = problem.matrix @ point
+        problem.lower[:], problem.upper[:] = value - width, value + width
+        problem.lower[:equalities] = problem.upper[:equalities]
+        problem.x_lower[:], problem.x_upper[:] = point - reach, point + reach
+
+    return Family(name, QuadraticProgram(variables, rows, weight), fill)
+
+
+def recorded(path: Path) -> Family:
+    """One recorded instance, its gradient trembling so that a warm start has something to do."""
+    instance = load_instance(path)
+    tremble = 1e-3 * np.random.default_rng(0).normal(size=(97, instance.variables))
+
+    def fill(problem: QuadraticProgram, step: int) -> None:
+        problem.copy_from(instance)
+        problem.gradient[:] *= 1.0 + tremble[step % 97]
+
+    return Family(path.stem, load_instance(path), fill)
+
+
+def choice(candidates: int) -> Family:
+    """Stage 3 in small: forces of one knot with friction pyramids, one candidate to choose, soft ZMP equations."""
+    rng = np.random.default_rng(candidates)
+    forces = 3 * candidates
+    rows = 3 + 5 * candidates
+    weight = np.zeros(rows)
+    weight[:2] = 1e5
+    problem = QuadraticProgram(forces + candidates, rows, weight, binary=range(forces, forces + candidates))
+    position = rng.uniform([0.1, -0.3, 0.05], [0.5, 0.3, 0.4], (candidates, 3))  # [m]
+
+    def fill(problem: QuadraticProgram, step: int) -> None:
+        shift = np.array([0.03, 0.02]) * (1.0 + 0.5 * np.sin(0.1 * step))  # [m] wanted ZMP shift
+        problem.hessian[range(forces), range(forces)] = 1.0
+        problem.gradient[forces:] = 10.0 * np.linalg.norm(position - position[0], axis=1)
+        problem.matrix[:] = 0.0
+        for index, (x, y, z) in enumerate(position):
+            fx, fy, fz = 3 * index, 3 * index + 1, 3 * index + 2
+            problem.matrix[0, [fx, fz]], problem.matrix[1, [fy, fz]] = (z, shift[0] - x), (z, shift[1] - y)
+            cone = 3 + 5 * index
+            for row, (tangent, sign) in enumerate([(fx, 1.0), (fx, -1.0), (fy, 1.0), (fy, -1.0)]):
+                problem.matrix[cone + row, [tangent, fz]] = sign, -0.35
+            problem.matrix[cone + 4, [fz, forces + index]] = 1.0, -20.0  # [N] force cap of a chosen candidate
+        problem.matrix[2, forces:] = 1.0
+        problem.lower[:2] = problem.upper[:2] = -33.0 * shift
+        problem.lower[2] = problem.upper[2] = 1.0
+        problem.upper[3:] = 0.0
+
+    return Family(f"stage 3, {candidates} candidates", problem, fill)
+
+
+def measure(family: Family, backends: list[str], steps: int) -> dict[str, Samples]:
+    """Every backend on every step, the order rotating."""
+    mixed = bool(family.problem.binary.size)
+    make = make_mip_workspace if mixed else make_workspace
+    family.fill(family.problem, 0)
+    workspaces = {name: make(name, family.problem) for name in backends}
+    for workspace in workspaces.values():
+        workspace.solve()
+    results = {name: Samples() for name in [*backends, *([] if mixed else [VECTORS, ONE_SHOT])]}
+    for step in range(1, steps + 1):
+        family.fill(family.problem, step)
+        turn = step % len(backends)
+        for name in backends[turn:] + backends[:turn]:
+            _record(results[name], workspaces[name].solve)
+        if not mixed:
+            family.problem.gradient *= 1.001
+            _record(results[VECTORS], lambda: workspaces["daqp"].solve(matrices_changed=False))
+            _one_shot(results[ONE_SHOT], family.problem)
+    return results
+
+
+def _record(samples: Samples, solve: Callable) -> None:
+    start = perf_counter()
+    solution = solve()
+    samples.seconds.append(perf_counter() - start)
+    samples.iterations.append(solution.iterations)
+    samples.failures += solution.status is not SolveStatus.SOLVED
+
+
+def _one_shot(samples: Samples, problem: QuadraticProgram) -> None:
+    """What a caller without a workspace pays; its soft rows share daqp's default weight."""
+    p = problem
+    start = perf_counter()
+    _, _, flag, info = daqp.solve(p.hessian, p.gradient, p.matrix, p.all_upper, p.all_lower, soft_sense(p))
+    samples.seconds.append(perf_counter() - start)
+    samples.iterations.append(info["iterations"])
+    samples.failures += flag not in (1, 2)
+
+
+def report(console: Console, family: Family, results: dict[str, Samples]) -> None:
+    """One table: microseconds, ratio to daqp, iterations, failures."""
+    p = family.problem
+    title = f"{family.name}: {p.variables} variables, {p.rows} rows ({p.soft_rows.size} soft)"
+    table = Table(title=title, title_justify="left")
+    for header in ("backend", "p50 [µs]", "p99 [µs]", "ratio to daqp", "iterations", "failures"):
+        table.add_column(header, justify="left" if header == "backend" else "right", no_wrap=True)
+    reference = np.median(results["daqp"].seconds)
+    for name, samples in sorted(results.items(), key=lambda item: float(np.median(item[1].seconds))):
+        p50, p99 = np.percentile(samples.seconds, [50, 99])
+        table.add_row(
+            name,
+            f"{1e6 * p50:.0f}",
+            f"{1e6 * p99:.0f}",
+            f"{p50 / reference:.2f}",
+            f"{np.mean(samples.iterations):.1f}",
+            str(samples.failures),
+        )
+    console.print(table)
+
+
+def main() -> None:
+    """Measure the families that the arguments ask for."""
+    parser = argparse.ArgumentParser(description="Solve times of the QP backends.")
+    parser.add_argument("--steps", type=int, default=200)
+    parser.add_argument("--backends", default=",".join(qp_backend_names()), help="comma-separated; daqp is always in")
+    default_instances = Path(__file__).parents[1] / "tests" / "qp" / "instances"
+    parser.add_argument("--instances", type=Path, default=default_instances, help="folder of recorded .npz problems")
+    arguments = parser.parse_args()
+    backends = ["daqp", *(name for name in arguments.backends.split(",") if name != "daqp")]
+    console = Console()
+    families = [
+        drifting("stage 1", 16, 48, equalities=0, soft=16),
+        drifting("stage 2", 55, 120, equalities=12, soft=64),
+        drifting("tracker", 41, 62, equalities=6, soft=0),
+        choice(4),
+        choice(8),
+        *(recorded(path) for path in sorted(arguments.instances.glob("*.npz"))),
+    ]
+    for family in families:
+        mixed = bool(family.problem.binary.size)
+        steps = min(arguments.steps, 20) if mixed else arguments.steps
+        report(console, family, measure(family, list(MIQP_BACKENDS) if mixed else backends, steps))
+
+
+if __name__ == "__main__":
+    main()
