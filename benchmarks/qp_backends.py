@@ -26,7 +26,7 @@ from wbmpc.qp.workspace import qp_backend_names
 from wbmpc.signals import SolveStatus
 
 Fill = Callable[[QuadraticProgram, int], None]  # writes the problem of one step
-ONE_SHOT = "daqp.solve, one-shot"
+ONE_SHOT = "daqp, one-shot"
 VECTORS = "daqp, same matrices"
 
 
@@ -158,7 +158,7 @@ def report(console: Console, family: Family, results: dict[str, Samples]) -> Non
     p = family.problem
     title = f"{family.name}: {p.variables} variables, {p.rows} rows ({p.soft_rows.size} soft)"
     table = Table(title=title, title_justify="left")
-    for header in ("backend", "p50 [µs]", "p99 [µs]", "ratio to daqp", "iterations", "failures"):
+    for header in ("backend", "p50 [µs]", "p99 [µs]", "× daqp", "iters", "failed"):
         table.add_column(header, justify="left" if header == "backend" else "right", no_wrap=True)
     reference = np.median(results["daqp"].seconds)
     for name, samples in sorted(results.items(), key=lambda item: float(np.median(item[1].seconds))):
