@@ -263,6 +263,28 @@ def test_home_stands(robot: Robot, home: mujoco.MjData) -> None:
     assert_allclose(_mirrored(robot, robot.home_q[7:]), robot.home_q[7:])
 
 
+def test_home_holds_on_a_floor() -> None:
+    """With the joints held stiffly at `home` on a floor, the robot stays; the soles, and nothing else, carry it."""
+    spec = mujoco.MjSpec.from_file(str(MODEL))
+    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 0.1])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
+    target = data.qpos[7:].copy()
+    for _ in range(1000):
+        data.ctrl[:] = 30 * (target - data.qpos[7:]) - 0.5 * data.qvel[6:]
+        mujoco.mj_step(model, data)
+    assert data.body("torso").xmat[8] > 0.999
+    touching = {name for pair in data.contact.geom for name in (model.geom(int(i)).name for i in pair)}
+    assert touching == {"floor", "left_foot", "right_foot"}
+    assert data.contact.dist.min() > -1e-3
+    force, total = np.zeros(6), 0.0
+    for contact in range(data.ncon):
+        mujoco.mj_contactForce(model, data, contact, force)
+        total += force[0]
+    assert total == pytest.approx(3.43 * GRAVITY, rel=0.02)
+
+
 def test_feet_do_not_touch_when_hips_are_straight(mj_model: mujoco.MjModel, home: mujoco.MjData) -> None:
     gap = home.site("left_sole").xpos[1] - home.site("right_sole").xpos[1] - 2 * mj_model.geom("left_foot").size[1]
     assert gap == pytest.approx(0.01, abs=1e-9)

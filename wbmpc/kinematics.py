@@ -102,7 +102,7 @@ class Kinematics:
         """Ȧ v (6,) [N, N·m].
 
         Read off the base rows of the bias: at v̇ = 0 they are the wrench that gives the robot this momentum rate in
-        gravity, and gravity has no moment about the CoM. Costs nothing; Ȧ itself would be another recursion.
+        gravity, and gravity has no moment about the CoM. Ȧ itself would cost another recursion over the joints.
         """
         base = self._data.oMi[1]
         about_com = pin.SE3(base.rotation, base.translation - self._data.com[0])
