@@ -38,8 +38,8 @@ class QpWorkspace(Protocol):
         """Solve the problem as its arrays stand now, warm-started from the workspace's own last solve.
 
         Pass matrices_changed=False when only the gradient and the bounds differ from the last solve: the
-        factorisation is then kept (daqp: three to seven times faster). Never raises for bad numbers: infeasible data and
-        data that are not finite are statuses.
+        factorisation is then kept (daqp: two to seven times faster). Never raises for bad numbers:
+        infeasible data and data that are not finite are statuses.
         """
         ...
 
