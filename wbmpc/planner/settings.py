@@ -1,4 +1,4 @@
-"""Settings of the planner: the three stages and the contact's life around them."""
+"""What a scenario may set about the planner. Defaults are the values all shipped scenarios run with."""
 
 from __future__ import annotations
 
@@ -6,15 +6,76 @@ from typing import Literal
 
 from pydantic import Field
 
-from wbmpc.strict import Count, Positive, StrictModel
+from wbmpc.strict import StrictModel
+
+
+class HeightSettings(StrictModel):
+    """Stage 1: the CoM height."""
+
+    jerk_cost: float = Field(1e-6, gt=0, description="[cost / (m/s³)²] weight of the vertical jerk")
+    velocity_cost: float = Field(1e-2, ge=0, description="[cost / (m/s)²] weight of the vertical velocity")
+    position_cost: float = Field(1.0, ge=0, description="[cost / m²] weight of the distance to the wanted height")
+    limit_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of leaving the legs' range")
+    band_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of leaving the band of an end-effector")
+    lowest: float = Field(0.16, gt=0, description="[m] lowest CoM above the feet that the legs allow")
+    highest: float = Field(0.275, gt=0, description="[m] highest CoM above the feet that the legs allow")
+    reach: float = Field(
+        0.22, gt=0, description="[m] d of the paper: largest vertical distance between CoM and a hand's target"
+    )
+    enabled: bool = Field(True, description="false freezes the CoM height at its initial value (a counterfactual)")
+
+
+class WholeBodySettings(StrictModel):
+    """Stage 2: horizontal CoM, ΔZ and joint velocities."""
+
+    jerk_cost: float = Field(1e-6, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
+    delta_z_cost: float = Field(10.0, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
+    joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
+    com_velocity_cost: float = Field(30.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
+    hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
+    velocity_cost: float = Field(1e-2, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
+    position_cost: float = Field(1e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
+    reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
+    zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
+    zmp_margin: float = Field(0.012, ge=0, description="[m] inset of the support polygon")
+    posture_rate: float = Field(1.0, ge=0, description="[1/s] pull of the joint velocities to the nominal posture")
+    torso_cost: float = Field(0.02, ge=0, description="[cost / (rad/s)²] pull of the torso to upright")
+    tracking_rate: float = Field(8.0, gt=0, description="[1/s] pull of the joint reference to its CoM, hands and feet")
+
+
+class ContactSettings(StrictModel):
+    """Stage 3 and the life of a contact around it."""
+
+    need_threshold: float = Field(0.002, gt=0, description="[m] largest |ΔZ| that needs no contact")
+    quiet_threshold: float = Field(0.001, gt=0, description="[m] |ΔZ| below which a held contact is not needed")
+    quiet_time: float = Field(0.3, gt=0, description="[s] how long ΔZ stays quiet before the contact is unloaded")
+    ramp_time: float = Field(0.3, gt=0, description="[s] ramp of the force cap up and down")
+    sensed_force: float = Field(0.3, gt=0, description="[N] normal force that counts as touched")
+    approach_clearance: float = Field(0.03, gt=0, description="[m] distance above the patch where the descent begins")
+    approach_speed: float = Field(0.25, gt=0, description="[m/s] mean speed of the hand towards the clearance point")
+    touch_speed: float = Field(0.06, gt=0, description="[m/s] speed of the descent: bounds the impact")
+    search_depth: float = Field(0.03, gt=0, description="[m] how far below the patch a descent looks for it")
+    force_cost: float = Field(1.0, gt=0, description="[cost] weight of |f|²/(m g)²")
+    shift_slack_cost: float = Field(100.0, gt=0, description="[cost / m²] price of a ΔZ that the force does not give")
+    distance_cost: float = Field(1.0, ge=0, description="[cost / m] w_i per metre between the hand and candidate i")
+    reach_margin: float = Field(0.005, ge=0, description="[m] IK residual up to which a candidate counts as reachable")
+    most_candidates: int = Field(16, ge=1, le=64, description="candidates that one firing considers, nearest first")
 
 
 class PlannerSettings(StrictModel):
-    """The scenario's `planner:` block."""
+    """The three-stage MPC."""
 
     formulation: Literal["paper", "exact"] = Field(
-        default="exact", description="Whether ΔZ follows the paper's formula or the exact one, free of its phantom ΔZ."
+        "exact", description="which ΔZ: the paper's (with its phantom term) or the exact one"
     )
-    horizon_steps: Count = Field(default=16, le=200, description="Number of knots N of the horizon [-].")
-    horizon_step: Positive = Field(default=0.1, le=1.0, description="Time between two knots T [s].")
-    contact_stage: bool = Field(default=True, description="Whether stage 3 may choose a contact at all.")
+    horizon_steps: int = Field(16, ge=2, le=64, description="N, knots of the preview")
+    horizon_step: float = Field(0.1, gt=0, le=0.5, description="T [s], time between knots")
+    contact_stage: bool = Field(True, description="false turns stage 3 off: ΔZ = 0 always (a counterfactual)")
+    qp_backend: str = Field("daqp", description="QP backend of stages 1 and 2: daqp, osqp or any name of qpsolvers")
+    miqp_backend: str = Field("daqp", description="MIQP backend of stage 3: daqp or highs")
+    feedback: float = Field(0.02, ge=0, le=1, description="share of the measured CoM error taken over at every plan")
+    feedback_large: float = Field(0.1, ge=0, le=1, description="the same for errors above feedback_knee")
+    feedback_knee: float = Field(0.01, gt=0, description="[m] capture-point error above which feedback_large rules")
+    height: HeightSettings = HeightSettings()
+    whole_body: WholeBodySettings = WholeBodySettings()
+    contact: ContactSettings = ContactSettings()

@@ -1,13 +1,55 @@
-"""Settings of the tracker: gains, weights and limits of its one QP per tick."""
+"""Settings of the tracker: gains, weights and limits of its one QP per tick.
+
+A gain pair (stiffness k [1/s²], damping d [1/s]) makes the wanted acceleration  a_ref + k (x_ref − x) + d (v_ref − v).
+Weights are in [cost / (m/s²)²] for positions and [cost / (rad/s²)²] for rotations and joints.
+"""
 
 from __future__ import annotations
 
 from pydantic import Field
 
-from wbmpc.strict import Positive, StrictModel
+from wbmpc.strict import StrictModel
 
 
 class TrackerSettings(StrictModel):
     """The scenario's `tracker:` block."""
 
-    joint_velocity_limit: Positive = Field(default=5.0, description="Bound on every joint's speed [rad/s].")
+    qp_backend: str = Field("daqp", description="QP backend: daqp, osqp or any name of qpsolvers")
+
+    com_stiffness: float = Field(40.0, ge=0, description="[1/s²]")
+    com_damping: float = Field(12.0, ge=0, description="[1/s]")
+    com_integral: float = Field(20.0, ge=0, description="[1/s³] removes what an unmodelled load leaves of the height")
+    com_integral_limit: float = Field(2.0, ge=0, description="[m/s²] bound on the integral's share")
+    com_weight: float = Field(200.0, gt=0, description="horizontal")
+    com_height_weight: float = Field(100.0, gt=0, description="vertical")
+    momentum_damping: float = Field(8.0, ge=0, description="[1/s] L̇ = −d L about the CoM")
+    momentum_weight: float = Field(20.0, ge=0, description="[cost / (N·m)²]")
+    torso_stiffness: float = Field(60.0, ge=0, description="[1/s²]")
+    torso_damping: float = Field(12.0, ge=0, description="[1/s]")
+    torso_weight: float = Field(0.5, ge=0)
+    stance_damping: float = Field(30.0, ge=0, description="[1/s] of a stance foot's and a braced palm's velocity")
+    stance_weight: float = Field(1000.0, gt=0)
+    swing_stiffness: float = Field(250.0, ge=0, description="[1/s²]")
+    swing_damping: float = Field(30.0, ge=0, description="[1/s]")
+    swing_weight: float = Field(100.0, gt=0)
+    hand_stiffness: float = Field(110.0, ge=0, description="[1/s²]")
+    hand_damping: float = Field(21.0, ge=0, description="[1/s]")
+    hand_weight: float = Field(5.0, gt=0)
+    hand_acceleration_limit: float = Field(5.0, gt=0, description="[m/s²] clip: the CoM must dominate the hands")
+    hand_integral: float = Field(60.0, ge=0, description="[1/s³] removes the steady error of a hand")
+    hand_integral_limit: float = Field(3.0, ge=0, description="[m/s²] bound on the integral's share")
+    braced_weight: float = Field(200.0, gt=0, description="of a palm in contact that should stay where it is")
+    posture_stiffness: float = Field(60.0, ge=0, description="[1/s²]")
+    posture_damping: float = Field(12.0, ge=0, description="[1/s]")
+    posture_weight: float = Field(0.02, gt=0)
+    hand_force_weight: float = Field(0.02, ge=0, description="[cost / N²] of a hand's force against its plan")
+    force_regularization: float = Field(1e-4, gt=0, description="[cost / N²] of every contact force")
+    acceleration_regularization: float = Field(1e-4, gt=0, description="[cost / (rad/s²)²] of every joint")
+
+    foot_friction: float = Field(0.6, gt=0, description="friction coefficient that the soles count on")
+    foot_yaw_radius: float = Field(0.03, gt=0, description="[m] yaw moment / (friction · normal force) of a sole")
+    foot_inset: float = Field(0.004, ge=0, description="[m] inset of the sole's rectangle for its centre of pressure")
+    joint_velocity_limit: float = Field(5.0, gt=0, description="[rad/s]")
+    limit_horizon: float = Field(0.025, gt=0, description="[s] within which a joint may stop before its limit")
+    torque_share: float = Field(0.95, gt=0, le=1, description="share of the servo's torque that may be planned")
+    fallback_damping: float = Field(0.05, ge=0, description="[N·m·s/rad] added to the last torque after a failed solve")

@@ -1,0 +1,28 @@
+"""The latest available plan: one immutable object, swapped whole."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from wbmpc.planner.plan import Plan
+
+
+class Mailbox:
+    """Hands plans from the planner to the tracker; a plan is visible from its `available_at` on.
+
+    One writer and one reader may be in different threads: deque's append and popleft are atomic.
+    """
+
+    def __init__(self) -> None:
+        self._posted: deque[tuple[float, Plan]] = deque()
+        self._current: Plan | None = None
+
+    def post(self, plan: Plan, *, available_at: float) -> None:
+        """Leave a plan that takes effect at `available_at` [s]."""
+        self._posted.append((available_at, plan))
+
+    def latest(self, time: float) -> Plan | None:
+        """The newest plan available at `time` [s]; None before the first."""
+        while self._posted and self._posted[0][0] <= time + 1e-9:
+            self._current = self._posted.popleft()[1]
+        return self._current

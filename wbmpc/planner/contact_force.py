@@ -1,0 +1,231 @@
+"""Stage 3: which available contact to take and with what force, a mixed-integer QP ([M] eqs. neweq, QP2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbmpc.planner.settings import ContactSettings
+from wbmpc.planner.support import MAX_EDGES, SupportPolygon
+from wbmpc.qp import QpSolution, QuadraticProgram, make_mip_workspace, make_workspace
+from wbmpc.rotations import contact_frame
+from wbmpc.scenario import PatchPose
+from wbmpc.signals import GRAVITY, SolveStatus, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """The ZMP shift that stage 2 asks for over n knots, and what it takes to turn it into a force."""
+
+    delta_z: Vector  # (n, 2) [m] wanted shift
+    zmp: Vector  # (n, 2) [m] Z_nc, the ZMP without contact
+    weight: Vector  # (n,) [N] m (g + c̈_z), the feet's vertical force without contact
+    polygons: tuple[SupportPolygon, ...]  # n of them
+    phantom: Vector  # (n, 2) [N m] 0 for the exact formulation; the paper's extra term m c_z c̈ c̈_z / g otherwise
+
+    def pick(self, knots: list[int]) -> Need:
+        """The same need at some knots only."""
+        return Need(
+            delta_z=self.delta_z[knots],
+            zmp=self.zmp[knots],
+            weight=self.weight[knots],
+            polygons=tuple(self.polygons[k] for k in knots),
+            phantom=self.phantom[knots],
+        )
+
+
+def shift_rows(need: Need, knot: int, point: Vector) -> tuple[Vector, Vector]:
+    """Rows G (2, 3) and right-hand side h (2,) [N m] of G f = h: the force f that gives the wanted ΔZ at one knot.
+
+    p_z f_xy + (Z_nc − p_xy + ΔZ) f_z = m (g + c̈_z) ΔZ − phantom   ([M] eq. neweq multiplied by p_z, so that
+    contacts near the foot plane are no singularity). `point` is p in world [m].
+    """
+    lever = point[2] - need.polygons[knot].plane_height
+    G = np.zeros((2, 3))
+    G[0, 0] = G[1, 1] = lever
+    G[:, 2] = need.zmp[knot] - point[:2] + need.delta_z[knot]
+    return G, need.weight[knot] * need.delta_z[knot] - need.phantom[knot]
+
+
+def polygon_rows(need: Need, knot: int, point: Vector) -> tuple[Vector, Vector]:
+    """Rows P (MAX_EDGES, 3) and bound q (MAX_EDGES,) [N m] of P f ≤ q: the feet's ZMP stays in its polygon under f.
+
+    A ((m (g + c̈_z)) Z_nc + p_z f_xy − p_xy f_z) ≤ b (m (g + c̈_z) − f_z): the exact ZMP times its denominator,
+    which is linear in f because Z_nc belongs to the plan.
+    """
+    polygon = need.polygons[knot]
+    lever = point[2] - polygon.plane_height
+    A, b = polygon.normals, np.where(np.isfinite(polygon.offsets), polygon.offsets, 1e3)
+    P = np.empty((MAX_EDGES, 3))
+    P[:, :2] = lever * A
+    P[:, 2] = b - A @ point[:2]
+    return P, need.weight[knot] * (b - A @ need.zmp[knot])
+
+
+def cone_rows(patch: PatchPose) -> Vector:
+    """Rows (4, 3) of C f ≤ 0: the linearised friction cone in the contact's own frame, inside the true cone."""
+    mu = patch.friction / np.sqrt(2.0)
+    tangent_1, tangent_2, normal = contact_frame(patch.normal).T
+    return np.array([sign * t - mu * normal for t in (tangent_1, tangent_2) for sign in (1.0, -1.0)])
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """Stage 3's answer when it fires."""
+
+    winner: int  # index of the candidate, -1 when none can give the wanted shift
+    forces: Vector  # (candidates, knots, 3) [N] in world; only the winner's row is non-zero
+    objective: float
+    solution: QpSolution
+
+
+class ContactChoice:
+    """minimise  Σ_i w_i H_i + w_f Σ|f|²/(mg)² + w_s |G f − h|²   over forces f_i of every candidate i and binaries H_i
+
+    subject to  n_i·f_i ≤ f_max H_i  (big-M: the force cap),  f_i in its friction cone,  ΣH_i = 1,
+                Σ_i P f_i ≤ q        the feet's ZMP inside the support polygon.
+
+    The shift equalities are softened because x and y share one force: a brace that gives ΔZ_x gives a ΔZ_y too, and
+    the polygon says how much of it the feet can take. The sums couple the candidates; the problem stays exact.
+    """
+
+    KNOTS = 2
+
+    def __init__(self, candidates: int, settings: ContactSettings, *, mass: float, backend: str) -> None:
+        self._candidates, self._settings = candidates, settings
+        forces = 3 * self.KNOTS * candidates
+        knot_rows = 2 + MAX_EDGES
+        rows = self.KNOTS * knot_rows + candidates * self.KNOTS * 5 + 1
+        soft = np.zeros(rows)
+        for knot in range(self.KNOTS):
+            # the equality is in N m; the slack's price is per metre of shift
+            soft[knot * knot_rows : knot * knot_rows + 2] = settings.shift_slack_cost / (mass * GRAVITY) ** 2
+        self.problem = QuadraticProgram(
+            forces + candidates, rows, soft_weight=soft, binary=range(forces, forces + candidates)
+        )
+        self.problem.hessian[:] = 0.0
+        self.problem.hessian[np.arange(forces), np.arange(forces)] = settings.force_cost / (mass * GRAVITY) ** 2
+        self._forces, self._knot_rows = forces, knot_rows
+        self._workspace = make_mip_workspace(backend, self.problem)
+
+    def solve(self, need: Need, patches: list[PatchPose], weights: Vector) -> Choice:
+        """Choose among `patches` (at most as many as built for) for a need of KNOTS knots.
+
+        Args:
+            weights: (len(patches),) w_i, the price of taking candidate i.
+        """
+        qp, forces, slots = self.problem, self._forces, self._candidates
+        qp.matrix[:] = 0.0
+        qp.gradient[:] = 0.0
+        qp.x_lower[:forces], qp.x_upper[:forces] = -np.inf, np.inf
+        qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
+        # An exact copy of a linear term on binaries: w H = w H², strictly convex as the solvers want it.
+        binaries = np.arange(forces, forces + slots)
+        qp.hessian[binaries, binaries] = 1e-6
+        row = self.KNOTS * self._knot_rows
+        for i in range(slots):
+            block = slice(3 * self.KNOTS * i, 3 * self.KNOTS * (i + 1))
+            if i >= len(patches):
+                qp.x_lower[block] = qp.x_upper[block] = 0.0
+                qp.x_upper[forces + i] = 0.0
+                qp.lower[row : row + 5 * self.KNOTS], qp.upper[row : row + 5 * self.KNOTS] = -np.inf, 0.0
+                row += 5 * self.KNOTS
+                continue
+            patch = patches[i]
+            qp.gradient[forces + i] = weights[i]
+            cone = cone_rows(patch)
+            for knot in range(self.KNOTS):
+                columns = slice(3 * (self.KNOTS * i + knot), 3 * (self.KNOTS * i + knot) + 3)
+                first = knot * self._knot_rows
+                G, h = shift_rows(need, knot, patch.position)
+                qp.matrix[first : first + 2, columns] = G
+                qp.lower[first : first + 2] = qp.upper[first : first + 2] = h
+                P, q = polygon_rows(need, knot, patch.position)
+                qp.matrix[first + 2 : first + self._knot_rows, columns] = P
+                qp.lower[first + 2 : first + self._knot_rows] = -np.inf
+                qp.upper[first + 2 : first + self._knot_rows] = q
+                qp.matrix[row : row + 4, columns] = cone
+                qp.matrix[row + 4, columns] = patch.normal
+                qp.matrix[row + 4, forces + i] = -patch.force_cap
+                qp.lower[row : row + 5], qp.upper[row : row + 5] = -np.inf, 0.0
+                row += 5
+        qp.matrix[row, forces:] = 1.0
+        qp.lower[row] = qp.upper[row] = 1.0
+        solution = self._workspace.solve()
+        if solution.status != SolveStatus.SOLVED:
+            return Choice(-1, np.zeros((len(patches), self.KNOTS, 3)), np.inf, solution)
+        x = solution.x
+        return Choice(
+            winner=int(np.argmax(x[forces : forces + len(patches)])),
+            forces=x[:forces].reshape(slots, self.KNOTS, 3)[: len(patches)].copy(),
+            objective=0.5 * float(x @ qp.hessian @ x) + float(qp.gradient @ x),
+            solution=solution,
+        )
+
+
+class ContactForce:
+    """The forces of the chosen contacts at every knot: stage 3 with H fixed.
+
+    The same objective and constraints as `ContactChoice`, plus a cap per knot that ramps a new contact in and an old one
+    out; over `contacts` hands at once. Polygon rows are soft here: while a cap ramps, the wanted shift may not be there.
+    """
+
+    def __init__(self, steps: int, settings: ContactSettings, *, mass: float, contacts: int, backend: str) -> None:
+        self._steps, self._contacts = steps, contacts
+        width = 3 * contacts
+        self._rows_per_knot = 2 + MAX_EDGES + 5 * contacts
+        rows = steps * self._rows_per_knot
+        soft = np.zeros((steps, self._rows_per_knot))
+        soft[:, :2] = settings.shift_slack_cost / (mass * GRAVITY) ** 2
+        soft[:, 2 : 2 + MAX_EDGES] = 1e4 * settings.shift_slack_cost / (mass * GRAVITY) ** 2
+        self.problem = QuadraticProgram(steps * width, rows, soft_weight=soft.ravel())
+        self.problem.hessian[:] = np.eye(steps * width) * (settings.force_cost / (mass * GRAVITY) ** 2)
+        self.problem.gradient[:] = 0.0
+        self.problem.x_lower[:], self.problem.x_upper[:] = -np.inf, np.inf
+        self.problem.matrix[:] = 0.0
+        self._width = width
+        self._workspace = make_workspace(backend, self.problem)
+
+    def solve(self, need: Need, patches: list[PatchPose | None], caps: Vector) -> tuple[Vector | None, QpSolution]:
+        """Forces (contacts, steps, 3) [N] in world for the wanted shifts.
+
+        Args:
+            patches: one per contact slot; None for an unused slot.
+            caps: (contacts, steps) bound on each normal force at each knot [N]; 0 where the contact is not there yet.
+        """
+        qp = self.problem
+        for k in range(self._steps):
+            first = k * self._rows_per_knot
+            cone_row = first + 2 + MAX_EDGES
+            for slot, patch in enumerate(patches):
+                columns = slice(k * self._width + 3 * slot, k * self._width + 3 * slot + 3)
+                cap = caps[slot, k]
+                if patch is None or cap <= 0.0:
+                    qp.x_lower[columns] = qp.x_upper[columns] = 0.0
+                    qp.matrix[first : first + self._rows_per_knot, columns] = 0.0
+                    qp.lower[cone_row : cone_row + 5] = -np.inf
+                    qp.upper[cone_row : cone_row + 5] = np.inf
+                else:
+                    qp.x_lower[columns], qp.x_upper[columns] = -np.inf, np.inf
+                    qp.matrix[first : first + 2, columns], _ = shift_rows(need, k, patch.position)
+                    qp.matrix[first + 2 : first + 2 + MAX_EDGES, columns], _ = polygon_rows(need, k, patch.position)
+                    qp.matrix[cone_row : cone_row + 4, columns] = cone_rows(patch)
+                    qp.matrix[cone_row + 4, columns] = patch.normal
+                    qp.lower[cone_row : cone_row + 5] = -np.inf
+                    qp.upper[cone_row : cone_row + 4] = 0.0
+                    qp.upper[cone_row + 4] = cap
+                cone_row += 5
+            anywhere = np.zeros(3)
+            _, h = shift_rows(need, k, anywhere)
+            _, q = polygon_rows(need, k, anywhere)
+            used = any(p is not None and caps[s, k] > 0.0 for s, p in enumerate(patches))
+            qp.lower[first : first + 2] = h if used else -np.inf
+            qp.upper[first : first + 2] = h if used else np.inf
+            qp.lower[first + 2 : first + 2 + MAX_EDGES] = -np.inf
+            qp.upper[first + 2 : first + 2 + MAX_EDGES] = q if used else np.inf
+        solution = self._workspace.solve()
+        if solution.status != SolveStatus.SOLVED:
+            return None, solution
+        forces = solution.x.reshape(self._steps, self._contacts, 3).transpose(1, 0, 2).copy()
+        return forces, solution

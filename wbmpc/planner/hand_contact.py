@@ -1,0 +1,214 @@
+"""The life of one hand's contact: needed, chosen, approaching, sensed, loaded, quiet, unloaded, released."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+from wbmpc.planner.hand_path import HandPath
+from wbmpc.planner.settings import ContactSettings
+from wbmpc.scenario import PatchPose
+from wbmpc.signals import ContactPhase, HandMode, Vector
+
+ARRIVED = 0.012  # [m] palm error at the clearance point below which the descent begins
+PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
+LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
+
+TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
+
+
+class HandContact:
+    """One hand's contact, from the choice of a patch to the hand's return.
+
+    `advance` moves the life on once per plan; everything else reads. Times are in seconds, forces in newtons.
+    """
+
+    def __init__(self, side: int, settings: ContactSettings, *, palm_radius: float) -> None:
+        self.side = side
+        self.phase = ContactPhase.NONE
+        self.patch: PatchPose | None = None
+        self._settings, self._radius = settings, palm_radius
+        self._clock = 0.0  # [s] in this phase
+        self._level = 0.0  # share of the force cap granted now, 0 … 1
+        self._descent = -1.0  # [m] how far the descent has come; negative: still on the way to the clearance point
+        self._path: HandPath | None = None
+        self._sigma, self._duration, self._rate = 0.0, 1.0, 1.0
+        self._touched = np.zeros(3)
+        self._unloaded_clock = 0.0
+
+    # ------------------------------------------------------------------ what others may ask
+
+    @property
+    def busy(self) -> bool:
+        """Whether the hand belongs to a contact now."""
+        return self.phase not in (ContactPhase.NONE, ContactPhase.NEEDED)
+
+    @property
+    def touching(self) -> bool:
+        """Whether the palm rests on its patch."""
+        return self.phase in TOUCHING
+
+    @property
+    def expected(self) -> bool:
+        """Whether the plan waits for this contact to carry its load: the task's progress is gated meanwhile."""
+        return self.phase in (
+            ContactPhase.NEEDED,
+            ContactPhase.CHOSEN,
+            ContactPhase.APPROACHING,
+            ContactPhase.SENSED,
+        )
+
+    @property
+    def mode(self) -> HandMode:
+        """What the tracker does with this hand."""
+        if self.touching:
+            return HandMode.CONTACT
+        return HandMode.MOVE if self.busy else HandMode.FREE
+
+    @property
+    def goal(self) -> Vector | None:
+        """Palm position (3,) of the contact in world [m]; None when there is none to reach or hold."""
+        if self.patch is None or self.phase == ContactPhase.RELEASED:
+            return None
+        return self._touched if self.touching else self.patch.position + self._radius * self.patch.normal
+
+    def reference(self) -> tuple[Vector, Vector, Vector]:
+        """Palm position, velocity and acceleration (3,) to follow now; only when busy."""
+        zero = np.zeros(3)
+        if self.touching:
+            return self._touched, zero, zero
+        assert self._path is not None and self.patch is not None
+        if self._descent >= 0.0:
+            settings = self._settings
+            moving = self._descent < settings.approach_clearance + settings.search_depth
+            normal = self.patch.normal
+            return (
+                self._path.end - self._descent * normal,
+                -settings.touch_speed * normal if moving else zero,
+                zero,
+            )
+        p, dp, ddp = self._path.at(self._sigma)
+        return p, dp * self._rate, ddp * self._rate**2
+
+    def caps(self, times: Vector) -> Vector:
+        """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
+        if not self.touching or self.patch is None:
+            return np.zeros(len(times))
+        slope = (-1.0 if self.phase == ContactPhase.UNLOADED else 1.0) / self._settings.ramp_time
+        return self.patch.force_cap * np.clip(self._level + slope * times, 0.0, 1.0)
+
+    # ------------------------------------------------------------------ the life
+
+    def choose(self, patch: PatchPose, *, palm: Vector) -> None:
+        """Stage 3 has chosen `patch`; the palm is at `palm` (3,)."""
+        self.patch = patch
+        settings = self._settings
+        clearance = patch.position + (self._radius + settings.approach_clearance) * patch.normal
+        self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)
+        self._duration = max(0.4, float(np.linalg.norm(clearance - palm)) / settings.approach_speed)
+        self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
+        self._enter(ContactPhase.CHOSEN)
+
+    def release(self, *, palm: Vector, home: Vector) -> None:
+        """Leave the surface (or give the approach up): lift along the normal and return to `home` (3,)."""
+        assert self.patch is not None
+        self._path = HandPath(start=home.copy(), end=palm + 0.02 * self.patch.normal, away=self.patch.normal)
+        self._duration = max(0.6, float(np.linalg.norm(palm - home)) / self._settings.approach_speed)
+        self._sigma, self._rate, self._descent = 1.0, -1.0 / self._duration, -1.0
+        self._enter(ContactPhase.RELEASED)
+
+    def need(self, needed: bool) -> None:
+        """Mark a hand without a contact as asked for one, or no longer."""
+        if not self.busy:
+            self.phase = ContactPhase.NEEDED if needed else ContactPhase.NONE
+
+    def advance(
+        self, dt: float, *, palm: Vector, force: Vector, wanted_force: float, needed: bool, quiet: bool, home: Vector
+    ) -> str | None:
+        """One plan later.
+
+        Args:
+            dt: since the last call [s].
+            palm: measured palm position (3,) [m].
+            force: measured palm force (3,) [N].
+            wanted_force: normal force that the plan asks for now [N].
+            needed: whether stage 2 still asks for a shift.
+            quiet: whether the asked shift is negligible over the whole horizon.
+            home: where the palm returns to (3,) [m].
+
+        Returns:
+            "failed" when the expected contact was not found and the candidate must be given up, else None.
+        """
+        if not self.busy or self.patch is None:
+            return None
+        settings, phase = self._settings, self.phase
+        self._clock += dt
+        normal_force = float(force @ self.patch.normal)
+        if phase == ContactPhase.CHOSEN:
+            self._enter(ContactPhase.APPROACHING)
+        elif phase == ContactPhase.APPROACHING:
+            return self._approach(dt, palm=palm, normal_force=normal_force, needed=needed, home=home)
+        elif phase == ContactPhase.RELEASED:
+            self._sigma += self._rate * dt
+            if self._sigma <= 0.0:
+                self.patch = None
+                self._enter(ContactPhase.NONE)
+        elif phase == ContactPhase.UNLOADED:
+            self._level = max(0.0, self._level - dt / settings.ramp_time)
+            if needed:
+                self._enter(ContactPhase.SENSED)
+            elif self._level <= 0.0:
+                self.release(palm=palm, home=home)
+        else:
+            self._level = min(1.0, self._level + dt / settings.ramp_time)
+            if phase == ContactPhase.SENSED and self._level >= 1.0:
+                self._enter(ContactPhase.LOADED)
+            elif phase == ContactPhase.LOADED and quiet:
+                self._enter(ContactPhase.QUIET)
+            elif phase == ContactPhase.QUIET:
+                if not quiet:
+                    self._enter(ContactPhase.LOADED)
+                elif self._clock >= settings.quiet_time:
+                    self._enter(ContactPhase.UNLOADED)
+        if self.touching and self.phase != ContactPhase.UNLOADED:
+            without = normal_force < 0.2 * settings.sensed_force and wanted_force > 1.0
+            self._unloaded_clock = self._unloaded_clock + dt if without else 0.0
+            if self._unloaded_clock > LOST_TIME:
+                self._descend_again(palm)
+        return None
+
+    def _approach(self, dt: float, *, palm: Vector, normal_force: float, needed: bool, home: Vector) -> str | None:
+        settings = self._settings
+        assert self.patch is not None and self._path is not None
+        if not needed and self._clock > 0.5:
+            self.release(palm=palm, home=home)
+            return None
+        if self._descent < 0.0:
+            self._sigma = min(1.0, self._sigma + self._rate * dt)
+            if self._sigma >= 1.0:
+                if np.linalg.norm(palm - self._path.end) < ARRIVED:
+                    self._descent = 0.0
+                elif self._clock > self._duration + PATIENCE:
+                    return "failed"
+            return None
+        if normal_force > settings.sensed_force:
+            self._touched = palm.copy()
+            self._level, self._unloaded_clock = 0.0, 0.0
+            self._enter(ContactPhase.SENSED)
+            return None
+        depth = settings.approach_clearance + settings.search_depth
+        if self._descent >= depth:
+            return "failed"
+        self._descent = min(depth, self._descent + settings.touch_speed * dt)
+        return None
+
+    def _descend_again(self, palm: Vector) -> None:
+        assert self.patch is not None
+        settings = self._settings
+        start = palm + 0.3 * settings.approach_clearance * self.patch.normal
+        self._path = HandPath(start=start, end=start, away=self.patch.normal)
+        self._descent, self._level, self._unloaded_clock = 0.0, 0.0, 0.0
+        self._enter(ContactPhase.APPROACHING)
+
+    def _enter(self, phase: ContactPhase) -> None:
+        self.phase, self._clock = phase, 0.0

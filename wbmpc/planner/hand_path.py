@@ -1,0 +1,58 @@
+"""Paths of a palm through space, as smooth functions of a parameter σ in [0, 1]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbmpc.signals import Vector
+
+LEAD = (0.0, 0.6)  # part of σ in which the leading component moves
+LAG = (0.25, 1.0)  # and the following one
+
+
+def minimum_jerk(phase: float) -> tuple[float, float, float]:
+    """Value, first and second derivative of the quintic from 0 to 1 that starts and ends at rest; clipped outside."""
+    if phase <= 0.0:
+        return 0.0, 0.0, 0.0
+    if phase >= 1.0:
+        return 1.0, 0.0, 0.0
+    p2 = phase * phase
+    return (
+        p2 * phase * (10.0 - 15.0 * phase + 6.0 * p2),
+        30.0 * p2 * (1.0 - 2.0 * phase + p2),
+        60.0 * phase * (1.0 - 3.0 * phase + 2.0 * p2),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class HandPath:
+    """From `start` to `end` (3,) in world [m], staying on the side that `away` points to.
+
+    The component of the motion along the unit vector `away` (out of a surface; up for a free reach) leads when it goes
+    outwards and lags when it goes inwards: the palm rises before it moves over an edge and sinks after.
+    """
+
+    start: Vector
+    end: Vector
+    away: Vector
+
+    def at(self, sigma: float) -> tuple[Vector, Vector, Vector]:
+        """Position (3,) [m] and its first and second derivative with respect to σ."""
+        way = self.end - self.start
+        along = float(way @ self.away)
+        outward = along * self.away
+        first, second = (LEAD, LAG) if along >= 0.0 else (LAG, LEAD)
+        p, dp, ddp = self.start.copy(), np.zeros(3), np.zeros(3)
+        for part, (begin, finish) in ((outward, first), (way - outward, second)):
+            scale = 1.0 / (finish - begin)
+            s, ds, dds = minimum_jerk((sigma - begin) * scale)
+            p += s * part
+            dp += ds * scale * part
+            ddp += dds * scale**2 * part
+        return p, dp, ddp
+
+    def positions(self, sigmas: Vector) -> Vector:
+        """Positions (n, 3) [m] at `sigmas` (n,)."""
+        return np.array([self.at(float(s))[0] for s in sigmas])

@@ -1,0 +1,109 @@
+"""The joint reference: a kinematic copy of the robot that stage 2's joint velocities move."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.kinematics import Kinematics
+from wbmpc.planner.settings import WholeBodySettings
+from wbmpc.planner.whole_body import VelocityTasks
+from wbmpc.robot import Robot
+from wbmpc.signals import SIDES, HandMode, Vector
+from wbmpc.rotations import level_frame, rotation_error
+
+LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
+SPEED_SHARE = 0.6  # of the servo's no-load speed that a plan may use
+
+
+class JointReference:
+    """A configuration q that integrates q̇, and stage 2's velocity tasks linearised at it.
+
+    Each task's velocity has a pull `tracking_rate` · (reference − position at q) that keeps q on its references; the
+    reference never takes in measured joint angles, so it is a steady posture to return to after a disturbance.
+    """
+
+    def __init__(self, robot: Robot, settings: WholeBodySettings, *, q: Vector) -> None:
+        self._robot, self._settings = robot, settings
+        self._kinematics = Kinematics(robot)
+        self.start = q.copy()  # (nq,) nominal posture
+        self.q = q.copy()  # (nq,)
+        self._kinematics.update_kinematics(self.q)
+
+    @property
+    def torso_rotation(self) -> Vector:
+        """(3, 3) torso to world at the reference."""
+        return self._kinematics.rotation(self._robot.torso_frame)
+
+    def torso_velocity(self, velocity: Vector) -> Vector:
+        """Angular velocity (3,) of the torso in world for joint velocities (nv,) [rad/s]."""
+        return self._kinematics.jacobian(self._robot.torso_frame)[3:] @ velocity
+
+    def advance(self, velocity: Vector, dt: float) -> None:
+        """Integrate q̇ (nv,) over dt [s]."""
+        self.q = self._robot.integrate(self.q, dt * velocity)
+        np.clip(self.q[7:], self._robot.joint_lower, self._robot.joint_upper, out=self.q[7:])
+
+    def tasks(
+        self,
+        *,
+        com: Vector,
+        vertical_velocity: float,
+        soles: Vector,
+        yaws: Vector,
+        hands: list[tuple[Vector, Vector, Vector, HandMode]],
+        posture: Vector,
+    ) -> VelocityTasks:
+        """Stage 2's velocity tasks at the reference.
+
+        Args:
+            com: planned CoM (3,) now [m].
+            vertical_velocity: stage 1's ċ_z [m/s].
+            soles, yaws: where the stance feet are, (2, 3) [m] and (2,) [rad].
+            hands: position, velocity, acceleration (3,) and mode of each hand.
+            posture: (nj,) joint angles to be drawn to [rad].
+        """
+        robot, settings, kinematics, nv = self._robot, self._settings, self._kinematics, self._robot.nv
+        kinematics.update_kinematics(self.q)
+        rate = settings.tracking_rate
+        foot_jacobian, foot_velocity = np.empty((12, nv)), np.empty(12)
+        hand_jacobian, hand_velocity = np.empty((6, nv)), np.zeros(6)
+        active = np.zeros(2)
+        for side in range(len(SIDES)):
+            frame = robot.sole_frames[side]
+            level = level_frame(yaws[side])
+            rows = slice(6 * side, 6 * side + 6)
+            foot_jacobian[rows] = kinematics.jacobian(frame)
+            foot_velocity[6 * side : 6 * side + 3] = rate * (soles[side] - kinematics.position(frame))
+            foot_velocity[6 * side + 3 : 6 * side + 6] = rate * rotation_error(
+                desired=level, measured=kinematics.rotation(frame)
+            )
+            frame = robot.palm_frames[side]
+            hand_jacobian[3 * side : 3 * side + 3] = kinematics.jacobian(frame)[:3]
+            position, velocity, _, mode = hands[side]
+            if mode != HandMode.FREE:
+                active[side] = 1.0
+                pull = rate * (position - kinematics.position(frame))
+                norm = float(np.linalg.norm(pull))
+                hand_velocity[3 * side : 3 * side + 3] = velocity + pull * min(1.0, 0.4 / max(norm, 1e-9))
+        up = kinematics.rotation(robot.torso_frame)[:, 2]
+        posture_velocity = np.zeros(nv)
+        posture_velocity[6:] = settings.posture_rate * (posture - self.q[7:])
+        speed = SPEED_SHARE * robot.joint_speed
+        lower, upper = np.full(nv, -5.0), np.full(nv, 5.0)
+        lower[6:] = np.clip((robot.joint_lower - self.q[7:]) / LIMIT_TIME, -speed, 0.0)
+        upper[6:] = np.clip((robot.joint_upper - self.q[7:]) / LIMIT_TIME, 0.0, speed)
+        return VelocityTasks(
+            com_jacobian=kinematics.com_jacobian,
+            com_correction=rate * (com - kinematics.com),
+            com_vertical_velocity=vertical_velocity,
+            foot_jacobian=foot_jacobian,
+            foot_velocity=foot_velocity,
+            hand_jacobian=hand_jacobian,
+            hand_velocity=hand_velocity,
+            hand_active=active,
+            torso_jacobian=kinematics.jacobian(robot.torso_frame)[3:],
+            torso_velocity=np.array([up[1], -up[0], 0.0]),
+            posture_velocity=posture_velocity,
+            lower=lower,
+            upper=upper,
+        )

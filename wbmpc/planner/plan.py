@@ -1,0 +1,88 @@
+"""The plan: what one run of the three stages hands to the tracker, sampled at any later tick."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbmpc.signals import PlanReport, Setpoint, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """References from the snapshot's time on. Interpolation lives here and nowhere else.
+
+    The CoM follows its constant jerks exactly; joints, feet and hands are continued with their velocity (and
+    acceleration) from the snapshot's time, for at most one knot: a late plan's tail holds still after that.
+    """
+
+    time: float  # [s] of the snapshot
+    step: float  # [s] T
+    com_states: Vector  # (N + 1, 3 axes, 3) c, ċ, c̈ at the snapshot and at every knot, in world
+    com_jerk: Vector  # (N, 3) [m/s³]
+    q: Vector  # (nq,) posture reference at the snapshot
+    velocity: Vector  # (nv,) q̇ of stage 2
+    torso_rotation: Vector  # (3, 3) of the posture reference, in world
+    torso_angular_velocity: Vector  # (3,) [rad/s]
+    foot_stance: NDArray[np.bool_]  # (2,)
+    foot_position: Vector  # (2, 3) [m]
+    foot_yaw: Vector  # (2,) [rad]
+    foot_velocity: Vector  # (2, 3) [m/s]
+    foot_acceleration: Vector  # (2, 3) [m/s²]
+    hand_mode: NDArray[np.int64]  # (2,)
+    hand_position: Vector  # (2, 3) [m]
+    hand_velocity: Vector  # (2, 3) [m/s]
+    hand_acceleration: Vector  # (2, 3) [m/s²]
+    hand_force: Vector  # (2, 3) [N]
+    hand_force_cap: Vector  # (2,) [N] at the snapshot
+    hand_force_cap_rate: Vector  # (2,) [N/s]
+    hand_force_cap_top: Vector  # (2,) [N]
+    hand_normal: Vector  # (2, 3)
+    hand_friction: Vector  # (2,)
+    report: PlanReport
+
+    def com_state(self, time: float) -> Vector:
+        """CoM state (3 axes, 3) = c, ċ, c̈ at `time` [m, m/s, m/s²]; the last knot's velocity goes on after the horizon."""
+        elapsed = max(time - self.time, 0.0)
+        knot = min(int(elapsed / self.step + 1e-9), len(self.com_jerk) - 1)
+        t = min(elapsed - knot * self.step, self.step)
+        state, jerk = self.com_states[knot], self.com_jerk[knot]
+        out = np.empty((3, 3))
+        out[:, 0] = state[:, 0] + t * state[:, 1] + t**2 / 2 * state[:, 2] + t**3 / 6 * jerk
+        out[:, 1] = state[:, 1] + t * state[:, 2] + t**2 / 2 * jerk
+        out[:, 2] = state[:, 2] + t * jerk
+        return out
+
+    def sample(self, time: float) -> Setpoint:
+        """The setpoint at `time` ≥ the snapshot's."""
+        dt = min(max(time - self.time, 0.0), self.step)
+        com = self.com_state(time)
+        wx, wy, wz = dt * self.torso_angular_velocity
+        turn = np.array([[1.0, -wz, wy], [wz, 1.0, -wx], [-wy, wx, 1.0]])
+        return Setpoint(
+            time=time,
+            com_position=com[:, 0],
+            com_velocity=com[:, 1],
+            com_acceleration=com[:, 2],
+            joint_position=self.q[7:] + dt * self.velocity[6:],
+            joint_velocity=self.velocity[6:],
+            torso_rotation=turn @ self.torso_rotation,
+            torso_angular_velocity=self.torso_angular_velocity,
+            foot_stance=self.foot_stance,
+            foot_position=self.foot_position + dt * self.foot_velocity + dt**2 / 2 * self.foot_acceleration,
+            foot_yaw=self.foot_yaw,
+            foot_velocity=self.foot_velocity + dt * self.foot_acceleration,
+            foot_acceleration=self.foot_acceleration,
+            hand_mode=self.hand_mode,
+            hand_position=self.hand_position + dt * self.hand_velocity + dt**2 / 2 * self.hand_acceleration,
+            hand_velocity=self.hand_velocity + dt * self.hand_acceleration,
+            hand_acceleration=self.hand_acceleration,
+            hand_force=self.hand_force,
+            hand_force_cap=np.clip(
+                self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0, self.hand_force_cap_top
+            ),
+            hand_normal=self.hand_normal,
+            hand_friction=self.hand_friction,
+        )

@@ -1,0 +1,96 @@
+"""Whole-body inverse kinematics: can the robot, standing as it stands, bring its palms there, and how?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.kinematics import Kinematics
+from wbmpc.robot import Robot
+from wbmpc.signals import Vector
+from wbmpc.rotations import level_frame, rotation_error
+
+SOLE_COST, PALM_COST, COM_COST, POSTURE_COST, TORSO_COST = 1e3, 1e2, 1.0, 2e-3, 5e-3
+STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
+JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
+
+
+class Posture:
+    """Damped Gauss-Newton on  1e3 Σ|sole error|² + 1e2 Σ|palm error|² + |c_xy − support centre|² + small posture terms.
+
+    The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
+    the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
+    started from the last, keep it current while targets move.
+    """
+
+    def __init__(self, robot: Robot, *, nominal: Vector) -> None:
+        """`nominal` (nq,) is the posture to deviate from as little as possible, and the start."""
+        self._robot, self._nominal = robot, nominal
+        self._kinematics = Kinematics(robot)
+        self._lower, self._upper = robot.joint_lower + JOINT_MARGIN, robot.joint_upper - JOINT_MARGIN
+        self.q = nominal.copy()  # (nq,)
+        self.com = np.zeros(3)  # [m] of the last iterate
+        self.residual = np.inf  # [m] largest palm error of the last iterate
+
+    def iterate(
+        self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector
+    ) -> None:
+        """Run `count` iterations.
+
+        Args:
+            soles: (2, 3) sole positions in world [m].
+            yaws: (2,) their headings [rad].
+            palms: wanted palm positions (3,) in world [m], left and right; None for a free hand.
+            centre: (2,) where the CoM should rather be [m].
+        """
+        robot, kinematics, nv = self._robot, self._kinematics, self._robot.nv
+        for _ in range(count):
+            kinematics.update_kinematics(self.q)
+            H = np.zeros((nv, nv))
+            g = np.zeros(nv)
+            for side, frame in enumerate(robot.sole_frames):
+                level = level_frame(yaws[side])
+                J = kinematics.jacobian(frame)
+                error = np.concatenate(
+                    [
+                        soles[side] - kinematics.position(frame),
+                        rotation_error(desired=level, measured=kinematics.rotation(frame)),
+                    ]
+                )
+                H += SOLE_COST * (J.T @ J)
+                g += SOLE_COST * (J.T @ error)
+            self.residual = 0.0
+            for side, frame in enumerate(robot.palm_frames):
+                target = palms[side]
+                if target is None:
+                    continue
+                J = kinematics.jacobian(frame)[:3]
+                error = target - kinematics.position(frame)
+                self.residual = max(self.residual, float(np.linalg.norm(error)))
+                error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
+                H += PALM_COST * (J.T @ J)
+                g += PALM_COST * (J.T @ error)
+            self.com = kinematics.com
+            J = kinematics.com_jacobian[:2]
+            H += COM_COST * (J.T @ J)
+            g += COM_COST * (J.T @ (centre - self.com[:2]))
+            J = kinematics.jacobian(robot.torso_frame)[3:]
+            up = kinematics.rotation(robot.torso_frame)[:, 2]
+            H += TORSO_COST * (J.T @ J)
+            g += TORSO_COST * (J.T @ np.array([up[1], -up[0], 0.0]))
+            diagonal = H.reshape(-1)[:: nv + 1]
+            diagonal[6:] += POSTURE_COST
+            g[6:] += POSTURE_COST * (self._nominal[7:] - self.q[7:])
+            diagonal += 1e-5
+            delta = np.linalg.solve(H, g)
+            # joints that would leave their range are fixed at it, once, and the rest solved again
+            wanted = self.q[7:] + delta[6:]
+            outside = np.flatnonzero((wanted < self._lower) | (wanted > self._upper)) + 6
+            if outside.size:
+                fixed = np.clip(wanted, self._lower, self._upper)[outside - 6] - self.q[7:][outside - 6]
+                free = np.setdiff1d(np.arange(nv), outside)
+                rest = g[free] - H[np.ix_(free, outside)] @ fixed
+                delta[outside] = fixed
+                delta[free] = np.linalg.solve(H[np.ix_(free, free)], rest)
+            np.clip(delta, -STEP_LIMIT, STEP_LIMIT, out=delta)
+            self.q = robot.integrate(self.q, delta)
+            np.clip(self.q[7:], self._lower, self._upper, out=self.q[7:])

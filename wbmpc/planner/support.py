@@ -1,0 +1,80 @@
+"""The support polygon of the stance feet and its half-planes, which bound the ZMP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbmpc.signals import Vector
+
+MAX_EDGES = 8  # two rectangles have a hull of at most eight edges
+
+
+def foot_corners(*, position: Vector, yaw: float, half_extents: Vector) -> Vector:
+    """Corners (4, 2) [m] of a sole in world, counter-clockwise.
+
+    Args:
+        position: (3,) or (2,) sole centre in world [m].
+        yaw: heading of the sole [rad].
+        half_extents: (2,) half length and half width [m].
+    """
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], dtype=float)
+    c, s = np.cos(yaw), np.sin(yaw)
+    return position[:2] + (signs * half_extents) @ np.array([[c, s], [-s, c]])
+
+
+def convex_hull(points: Vector) -> Vector:
+    """Convex hull (k, 2) of points (n, 2), counter-clockwise, collinear points dropped (monotone chain)."""
+    order = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
+
+    def chain(sequence: list[list[float]]) -> list[list[float]]:
+        hull: list[list[float]] = []
+        for p in sequence:
+            while len(hull) >= 2:
+                (ax, ay), (bx, by) = hull[-2], hull[-1]
+                if (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax) > 1e-12:
+                    break
+                hull.pop()
+            hull.append(p)
+        return hull
+
+    lower, upper = chain(order), chain(order[::-1])
+    return np.array(lower[:-1] + upper[:-1])
+
+
+@dataclass(frozen=True, slots=True)
+class SupportPolygon:
+    """Half-planes `normals @ z <= offsets` of a convex polygon, padded to MAX_EDGES rows.
+
+    A padded row is 0 <= inf, so that a QP keeps its shape while the polygon changes.
+    """
+
+    vertices: Vector  # (k, 2) [m] counter-clockwise, margin not subtracted
+    normals: Vector  # (MAX_EDGES, 2) outward unit normals
+    offsets: Vector  # (MAX_EDGES,) [m] margin subtracted
+    centre: Vector  # (2,) [m] mean of the vertices
+    plane_height: float  # [m] of the ZMP plane in world
+
+    @classmethod
+    def of_corners(cls, corners: Vector, *, margin: float, plane_height: float) -> SupportPolygon:
+        """Polygon of corner points (n, 2) [m], shrunk by `margin` [m] towards the inside."""
+        vertices = convex_hull(corners)
+        edges = np.roll(vertices, -1, axis=0) - vertices
+        normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        offsets = np.einsum("ij,ij->i", normals, vertices) - margin
+        pad = MAX_EDGES - len(vertices)
+        if pad < 0:
+            raise ValueError(f"a support polygon has at most {MAX_EDGES} edges, received {len(vertices)}")
+        return cls(
+            vertices=vertices,
+            normals=np.vstack([normals, np.zeros((pad, 2))]),
+            offsets=np.concatenate([offsets, np.full(pad, np.inf)]),
+            centre=vertices.mean(axis=0),
+            plane_height=plane_height,
+        )
+
+    def excess(self, point: Vector) -> float:
+        """How far `point` (2,) lies outside the shrunk polygon [m]; negative inside (largest edge violation)."""
+        return float(np.max(self.normals @ point[:2] - self.offsets))
