@@ -14,6 +14,7 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
     recorder, facts = context.recorder, context.facts
     if recorder.ticks == 0:
         return {"simulated_time": 0.0}
+    joints = facts.no_load_speed.size
     depth = -recorder.contacts.distance
     palm_push = np.linalg.norm(context.palm_force, axis=2)  # (n, 2)
     stage3 = sum(plan.stage3.status != SolveStatus.NOT_RUN for plan in recorder.plans)
@@ -26,7 +27,7 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
         "com_speed_max": float(np.linalg.norm(recorder.com_velocity, axis=1).max()),
         "torso_up_min": float(recorder.torso_up.min()),
         "torque_peak_fraction": float((np.abs(recorder.torque) / facts.stall_torque).max()),
-        "speed_peak_fraction": float((np.abs(recorder.qvel[:, 6:]) / facts.no_load_speed).max()),
+        "speed_peak_fraction": float((np.abs(recorder.qvel[:, 6 : 6 + joints]) / facts.no_load_speed).max()),
         "penetration_max": float(max(depth.max(initial=0.0), 0.0)),
         "hand_force_max": float(palm_push.max()),
         "hand_contacts": float(len(starts)),

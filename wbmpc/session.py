@@ -59,7 +59,8 @@ def run_scenario(
     robot = Robot.load(robot_path(scenario))
     model = build_world(scenario, robot_path(scenario))
     patches = resolve_patches(scenario)
-    recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
+    ticks = round(scenario.duration * scenario.loop.physics_rate)
+    recorder = Recorder(robot, expected_ticks=ticks, plant_nq=model.nq, plant_nv=model.nv)
     run = run_realtime if realtime else run_lockstep
     with _sink(recording, name, scenario, model, robot, recorder, patches) as sink:
         timing = run(scenario, robot=robot, recorder=recorder, sink=sink, on_progress=on_progress)

@@ -38,7 +38,8 @@ class SpeedLimitCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        ratio = np.abs(context.recorder.qvel[:, 6:]) / context.facts.no_load_speed  # (n, nj)
+        joints = context.facts.no_load_speed.size  # after them come the loose objects of the world
+        ratio = np.abs(context.recorder.qvel[:, 6 : 6 + joints]) / context.facts.no_load_speed  # (n, nj)
         return _worst_joint(name, ratio, context, threshold=self.config.max, what="largest share of no-load speed")
 
 

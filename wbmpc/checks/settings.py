@@ -185,7 +185,6 @@ class PushRecovery(CheckSettings):
     max_com_speed: Positive = Field(default=0.05, description="[m/s]")
 
 
-UniversalCheck = NoFall | DeclaredContacts | Penetration | TorqueLimit | SpeedLimit | SolverFailures | MomentumBalance
 ScenarioCheck = Annotated[
     Reach
     | Withdrawn
