@@ -14,10 +14,12 @@ import numpy as np
 from wbmpc.checks.context import CheckContext
 from wbmpc.checks.registry import evaluate_checks
 from wbmpc.facts import facts_of
+from wbmpc.loop import LoopTiming, run_lockstep
 from wbmpc.metrics import metrics_of
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose, Scenario, build_world, resolve_patches, robot_path
+from wbmpc.signals import Vector
 from wbmpc.verdict import Verdict, solver_statistics, versions
 
 PATCH_DRAWN = 0.02  # [m] half edge of the square that stands for a candidate contact in the recording
@@ -52,18 +54,15 @@ def run_scenario(
     Raises:
         WbmpcError: the robot cannot be read, or the recording not written.
     """
-    from wbmpc.loop import run_lockstep
-    from wbmpc.realtime import run_realtime
-
     started = perf_counter()
     robot = Robot.load(robot_path(scenario))
     model = build_world(scenario, robot_path(scenario))
     patches = resolve_patches(scenario)
     ticks = round(scenario.duration * scenario.loop.physics_rate)
     recorder = Recorder(robot, expected_ticks=ticks, plant_nq=model.nq, plant_nv=model.nv)
-    run = run_realtime if realtime else run_lockstep
+    run = _loop(realtime)
     with _sink(recording, name, scenario, model, robot, recorder, patches) as sink:
-        timing = run(scenario, robot=robot, recorder=recorder, sink=sink, on_progress=on_progress)
+        timing = run(scenario, robot=robot, recorder=recorder, model=model, sink=sink, on_progress=on_progress)
         context = CheckContext(recorder, facts_of(model, robot, scenario, patches))
         verdict = Verdict(
             scenario=name,
@@ -78,6 +77,14 @@ def run_scenario(
         if sink is not None:
             sink.finish(verdict.as_dict())
     return RunResult(verdict, recorder, perf_counter() - started)
+
+
+def _loop(realtime: bool) -> Callable[..., LoopTiming]:
+    if not realtime:
+        return run_lockstep
+    from wbmpc.realtime import run_realtime  # threads and their settings: only for those who ask for them
+
+    return run_realtime
 
 
 def _sink(  # type: ignore[no-untyped-def]  # a context manager of a RerunSink, or of None
@@ -109,7 +116,7 @@ def _sink(  # type: ignore[no-untyped-def]  # a context manager of a RerunSink, 
     )
 
 
-def _square(patch: PatchPose) -> np.ndarray:
+def _square(patch: PatchPose) -> Vector:
     """(4, 3) [m] corners of a square on the surface around the patch's centre."""
     along = np.eye(3)[np.argmin(np.abs(patch.normal))]
     first = np.cross(patch.normal, along)

@@ -10,8 +10,6 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressC
 
 from wbmpc.commands.exits import say
 
-UPDATE_PERIOD = 0.05  # [s] simulated time between two updates: they cost as much as a tick
-
 
 @contextmanager
 def simulated_time(name: str, duration: float) -> Iterator[Callable[[float], None]]:
@@ -24,15 +22,7 @@ def simulated_time(name: str, duration: float) -> Iterator[Callable[[float], Non
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task(name, total=duration)
-        shown = 0.0
-
-        def update(time: float) -> None:
-            nonlocal shown
-            if time >= shown + UPDATE_PERIOD:
-                shown = time
-                progress.update(task, completed=time)
-
-        yield update
+        yield lambda time: progress.update(task, completed=time)
 
 
 @contextmanager
