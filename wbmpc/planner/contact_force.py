@@ -70,6 +70,12 @@ def cone_rows(patch: PatchPose) -> Vector:
     return np.array([sign * t - mu * normal for t in (tangent_1, tangent_2) for sign in (1.0, -1.0)])
 
 
+def force_price(patch: PatchPose, settings: ContactSettings, mass: float) -> Vector:
+    """Hessian (3, 3) [cost / N²] of one force: the normal part, and the tangential part at its own price."""
+    along = np.outer(patch.normal, patch.normal)
+    return (settings.force_cost * along + settings.tangent_cost * (np.eye(3) - along)) / (mass * GRAVITY) ** 2
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
     """Stage 3's answer when it fires."""
@@ -104,8 +110,7 @@ class ContactChoice:
         self.problem = QuadraticProgram(
             forces + candidates, rows, soft_weight=soft, binary=range(forces, forces + candidates)
         )
-        self.problem.hessian[:] = 0.0
-        self.problem.hessian[np.arange(forces), np.arange(forces)] = settings.force_cost / (mass * GRAVITY) ** 2
+        self._mass = mass
         self._forces, self._knot_rows = forces, knot_rows
         self._workspace = make_mip_workspace(backend, self.problem)
 
@@ -120,9 +125,8 @@ class ContactChoice:
         qp.gradient[:] = 0.0
         qp.x_lower[:forces], qp.x_upper[:forces] = -np.inf, np.inf
         qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
-        # An exact copy of a linear term on binaries: w H = w H², strictly convex as the solvers want it.
-        binaries = np.arange(forces, forces + slots)
-        qp.hessian[binaries, binaries] = 1e-6
+        # a small curvature everywhere: solvers want strict convexity, unused slots and binaries have no cost of their own
+        qp.hessian[:] = 1e-6 * np.eye(forces + slots)
         row = self.KNOTS * self._knot_rows
         for i in range(slots):
             block = slice(3 * self.KNOTS * i, 3 * self.KNOTS * (i + 1))
@@ -135,9 +139,11 @@ class ContactChoice:
             patch = patches[i]
             qp.gradient[forces + i] = weights[i]
             cone = cone_rows(patch)
+            price = force_price(patch, self._settings, self._mass)
             for knot in range(self.KNOTS):
                 columns = slice(3 * (self.KNOTS * i + knot), 3 * (self.KNOTS * i + knot) + 3)
                 first = knot * self._knot_rows
+                qp.hessian[columns, columns] = price
                 G, h = shift_rows(need, knot, patch.position)
                 qp.matrix[first : first + 2, columns] = G
                 qp.lower[first : first + 2] = qp.upper[first : first + 2] = h
@@ -180,6 +186,7 @@ class ContactForce:
         soft[:, :2] = settings.shift_slack_cost / (mass * GRAVITY) ** 2
         soft[:, 2 : 2 + MAX_EDGES] = 1e4 * settings.shift_slack_cost / (mass * GRAVITY) ** 2
         self.problem = QuadraticProgram(steps * width, rows, soft_weight=soft.ravel())
+        self._settings, self._mass = settings, mass
         self.problem.hessian[:] = np.eye(steps * width) * (settings.force_cost / (mass * GRAVITY) ** 2)
         self.problem.gradient[:] = 0.0
         self.problem.x_lower[:], self.problem.x_upper[:] = -np.inf, np.inf
@@ -208,6 +215,7 @@ class ContactForce:
                     qp.upper[cone_row : cone_row + 5] = np.inf
                 else:
                     qp.x_lower[columns], qp.x_upper[columns] = -np.inf, np.inf
+                    qp.hessian[columns, columns] = force_price(patch, self._settings, self._mass)
                     qp.matrix[first : first + 2, columns], _ = shift_rows(need, k, patch.position)
                     qp.matrix[first + 2 : first + 2 + MAX_EDGES, columns], _ = polygon_rows(need, k, patch.position)
                     qp.matrix[cone_row : cone_row + 4, columns] = cone_rows(patch)

@@ -9,13 +9,14 @@ from wbmpc.robot import Robot
 from wbmpc.signals import Vector
 from wbmpc.rotations import level_frame, rotation_error
 
-SOLE_COST, PALM_COST, COM_COST, POSTURE_COST, TORSO_COST = 1e3, 1e2, 1.0, 2e-3, 5e-3
+SOLE_COST, PALM_COST, COM_COST, POSTURE_COST = 1e4, 1e3, 2.0, 2e-3
+DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
 class Posture:
-    """Damped Gauss-Newton on  1e3 Σ|sole error|² + 1e2 Σ|palm error|² + |c_xy − support centre|² + small posture terms.
+    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 2 |c_xy − support centre|² + 2e-3 |posture error|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
     the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
@@ -73,14 +74,10 @@ class Posture:
             J = kinematics.com_jacobian[:2]
             H += COM_COST * (J.T @ J)
             g += COM_COST * (J.T @ (centre - self.com[:2]))
-            J = kinematics.jacobian(robot.torso_frame)[3:]
-            up = kinematics.rotation(robot.torso_frame)[:, 2]
-            H += TORSO_COST * (J.T @ J)
-            g += TORSO_COST * (J.T @ np.array([up[1], -up[0], 0.0]))
             diagonal = H.reshape(-1)[:: nv + 1]
             diagonal[6:] += POSTURE_COST
             g[6:] += POSTURE_COST * (self._nominal[7:] - self.q[7:])
-            diagonal += 1e-5
+            diagonal += DAMPING
             delta = np.linalg.solve(H, g)
             # joints that would leave their range are fixed at it, once, and the rest solved again
             wanted = self.q[7:] + delta[6:]

@@ -28,16 +28,16 @@ class HeightSettings(StrictModel):
 class WholeBodySettings(StrictModel):
     """Stage 2: horizontal CoM, ΔZ and joint velocities."""
 
-    jerk_cost: float = Field(1e-6, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
-    delta_z_cost: float = Field(10.0, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
+    jerk_cost: float = Field(1e-5, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
+    delta_z_cost: float = Field(1.0, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
     joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
     com_velocity_cost: float = Field(30.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
     hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
-    velocity_cost: float = Field(1e-2, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
+    velocity_cost: float = Field(3e-2, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(1e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
-    zmp_margin: float = Field(0.012, ge=0, description="[m] inset of the support polygon")
+    zmp_margin: float = Field(0.015, ge=0, description="[m] inset of the support polygon")
     posture_rate: float = Field(1.0, ge=0, description="[1/s] pull of the joint velocities to the nominal posture")
     torso_cost: float = Field(0.02, ge=0, description="[cost / (rad/s)²] pull of the torso to upright")
     tracking_rate: float = Field(8.0, gt=0, description="[1/s] pull of the joint reference to its CoM, hands and feet")
@@ -55,8 +55,11 @@ class ContactSettings(StrictModel):
     approach_speed: float = Field(0.25, gt=0, description="[m/s] mean speed of the hand towards the clearance point")
     touch_speed: float = Field(0.06, gt=0, description="[m/s] speed of the descent: bounds the impact")
     search_depth: float = Field(0.03, gt=0, description="[m] how far below the patch a descent looks for it")
-    force_cost: float = Field(1.0, gt=0, description="[cost] weight of |f|²/(m g)²")
-    shift_slack_cost: float = Field(100.0, gt=0, description="[cost / m²] price of a ΔZ that the force does not give")
+    force_cost: float = Field(1.0, gt=0, description="[cost] weight of (n·f)²/(m g)²")
+    tangent_cost: float = Field(
+        5.0, gt=0, description="[cost] weight of |f_t|²/(m g)²: friction is uncertain and turns the feet"
+    )
+    shift_slack_cost: float = Field(1.0, gt=0, description="[cost / m²] price of a ΔZ that the force does not give")
     distance_cost: float = Field(1.0, ge=0, description="[cost / m] w_i per metre between the hand and candidate i")
     reach_margin: float = Field(0.005, ge=0, description="[m] IK residual up to which a candidate counts as reachable")
     most_candidates: int = Field(16, ge=1, le=64, description="candidates that one firing considers, nearest first")

@@ -22,6 +22,7 @@ from wbmpc.tracker.settings import TrackerSettings
 from wbmpc.tracker.tasks import TaskStack
 
 FORCES = 18  # two sole wrenches (6 each), then two palm forces (3 each), each in its contact's own frame
+FRICTION_SPEED = 0.1  # [rad/s] wanted speed from which a joint's dry friction is fully compensated
 TORQUE_SLACK_COST = 1e4  # [cost / (N·m)²]; what a violated row would ask is clipped by the servo's limit anyway
 
 
@@ -193,7 +194,9 @@ class Tracker:
         np.matmul(M[6:, :6], base_map, out=rows)
         rows[:, :nj] += M[6:, 6:]
         rows[:, nj:] -= J[:, 6:].T
-        self._torque_offset = h[6:] + M[6:, :6] @ base_offset + self._robot.damping * velocity
+        robot = self._robot
+        self._torque_offset = h[6:] + M[6:, :6] @ base_offset + robot.damping * velocity
+        self._torque_offset += robot.frictionloss * np.tanh(setpoint.joint_velocity / FRICTION_SPEED)
         lower, upper = self._limits.torque(velocity)
         np.subtract(lower, self._torque_offset, out=qp.lower[self._torque_rows])
         np.subtract(upper, self._torque_offset, out=qp.upper[self._torque_rows])

@@ -62,5 +62,5 @@ class Patch(StrictModel):
         default="top", description="Face in the object's own frame: front +x, back −x, left +y, right −y, top +z."
     )
     offset: Vector2 = Field(default=(0.0, 0.0), description="From the face's centre, along the face's two axes [m].")
-    friction: Friction = Field(default=0.5, description="Friction coefficient that the planner counts on [-].")
+    friction: Friction = Field(default=0.4, description="Friction coefficient that the planner counts on [-].")
     force_cap: Positive = Field(default=15.0, description="Largest normal force that the planner may ask for [N].")
