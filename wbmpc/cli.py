@@ -17,7 +17,7 @@ app = typer.Typer(
     help="Closed-loop MuJoCo testbed for three-stage whole-body MPC with external contacts.",
 )
 
-Files = Annotated[list[Path], typer.Argument(metavar="SCENARIO...", help="Scenario files (YAML).", show_default=False)]
+Files = Annotated[list[Path], typer.Argument(metavar="SCENARIO", help="Scenario files (YAML).", show_default=False)]
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (YAML).", show_default=False)]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
 Overrides = Annotated[
@@ -40,7 +40,7 @@ def main() -> None:
 
 def _print_versions(wanted: bool) -> None:
     if wanted:
-        from wbmpc.verdict import versions
+        from wbmpc.versions import versions
 
         for name, number in versions().items():
             typer.echo(f"{name} {number}")
@@ -130,3 +130,37 @@ def sweep_command(
         return sweep(scenario, options)
 
     raise typer.Exit(guarded(work, traceback_path=out / "sweep.traceback.txt", debug=debug))
+
+
+@app.command("render", help="Draw a recording (.rrd) without a screen: a picture, a strip of them, or an animation.")
+def render_command(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="An .rrd file.", show_default=False)],
+    target: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help=".png; .webp or .gif: animated unless one --time is given.")
+    ] = Path("out/render.png"),
+    times: Annotated[
+        list[float] | None,
+        typer.Option("--time", help="[s] repeatable; one picture each, or the ends of an animation [the last sample]."),
+    ] = None,
+    rate: Annotated[float, typer.Option(min=1, max=100, help="[Hz] frames a second of an animation.")] = 20.0,
+    width: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
+    height: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
+    azimuth: Annotated[float, typer.Option(help="[deg] direction of view about z: 90 along +y.")] = 140.0,
+    elevation: Annotated[float, typer.Option(help="[deg] negative: from above.")] = -14.0,
+    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.15,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.render import RenderOptions, render
+
+        options = RenderOptions(
+            times=times or [],
+            rate=rate,
+            size=(width, height),
+            azimuth=azimuth,
+            elevation=elevation,
+            distance=distance,
+        )
+        return render(recording, target, options)
+
+    raise typer.Exit(guarded(work, traceback_path=Path("out/render.traceback.txt"), debug=debug))

@@ -20,7 +20,8 @@ from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose, Scenario, build_world, resolve_patches, robot_path
 from wbmpc.signals import Vector
-from wbmpc.verdict import Verdict, solver_statistics, versions
+from wbmpc.verdict import Verdict, solver_statistics
+from wbmpc.versions import versions
 
 PATCH_DRAWN = 0.02  # [m] half edge of the square that stands for a candidate contact in the recording
 

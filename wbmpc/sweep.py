@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from multiprocessing import get_context
@@ -97,7 +97,7 @@ def run_draws(
     on_done: Callable[[dict[str, Any]], None],
     work: Callable[[Draw], dict[str, Any]] = run_draw,
 ) -> list[dict[str, Any]]:
-    """Run the draws that the journal does not have yet, in `jobs` spawned processes.
+    """Run the draws that the journal does not have yet, in `jobs` processes.
 
     Args:
         on_done: called with the row of each draw when it is finished and safely in the journal.
@@ -108,20 +108,26 @@ def run_draws(
     """
     rows = {row["draw"]: row for row in journal.rows}
     todo = [draw for draw in draws if draw.index not in rows]
-    if todo:
-        # Spawned, not forked: solver libraries hold threads and locks that do not survive a fork.
-        with ProcessPoolExecutor(min(jobs, len(todo)), mp_context=get_context("spawn")) as pool:
-            futures = [pool.submit(work, draw) for draw in todo]
-            try:
-                for future in as_completed(futures):
-                    row = future.result()
-                    journal.append(row)
-                    rows[row["draw"]] = row
-                    on_done(row)
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+    for row in _finished(todo, min(jobs, len(todo)), work):
+        journal.append(row)
+        rows[row["draw"]] = row
+        on_done(row)
     return [rows[draw.index] for draw in draws]
+
+
+def _finished(draws: Sequence[Draw], jobs: int, work: Callable[[Draw], dict[str, Any]]) -> Iterator[dict[str, Any]]:
+    """Rows of the draws as they finish; in this process when one is enough."""
+    if jobs <= 1:
+        yield from map(work, draws)
+        return
+    # Spawned, not forked: solver libraries hold threads and locks that do not survive a fork.
+    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(work, draw) for draw in draws]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def severity(row: Mapping[str, Any], ignored: Sequence[str] = ()) -> tuple[int, float]:

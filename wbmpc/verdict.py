@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +14,7 @@ import numpy as np
 from wbmpc.checks.result import CheckResult
 from wbmpc.recorder import Recorder
 from wbmpc.signals import SolveStatus, StageReport, Vector
-
-VERSIONED = ("wbmpc", "mujoco", "pin", "numpy", "scipy", "daqp", "osqp", "qpsolvers", "highspy", "rerun-sdk")
+from wbmpc.versions import versions
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,7 @@ class Verdict:
     real_time_factor: float  # simulated time per wall time
     missed_deadlines: int
     state_sha256: str
-    versions: Mapping[str, str] = field(default_factory=lambda: versions())
+    versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
     def passed(self) -> bool:
@@ -69,17 +66,6 @@ def write_json(path: Path, document: Mapping[str, Any]) -> None:
     partial = path.with_name(path.name + ".partial")
     partial.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     partial.replace(path)
-
-
-def versions() -> dict[str, str]:
-    """Version of Python and of every package that a verdict depends on; "absent" when one is not installed."""
-    found = {"python": platform.python_version()}
-    for name in VERSIONED:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "absent"
-    return found
 
 
 def solver_statistics(recorder: Recorder) -> dict[str, dict[str, float]]:

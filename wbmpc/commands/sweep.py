@@ -25,7 +25,8 @@ from wbmpc.errors import WbmpcError
 from wbmpc.scenario import load_scenario, robot_path
 from wbmpc.sweep import Draw, draw_values, header_of, run_draws, scenario_of, severity
 from wbmpc.sweep_journal import Journal
-from wbmpc.verdict import versions, write_json
+from wbmpc.verdict import write_json
+from wbmpc.versions import versions
 
 CONFIDENCE = 0.95
 WORST_SHOWN = 5
