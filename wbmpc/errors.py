@@ -28,7 +28,9 @@ class Problem:
     excerpt: str = ""  # the offending source line and, under it, a caret; empty when there is no line
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.message}"
+        # Keys and values come from the user and may hold line breaks; a problem is always one line.
+        text = f"{self.place}: {self.message}"
+        return "".join(character if character.isprintable() else repr(character)[1:-1] for character in text)
 
 
 class ScenarioError(WbmpcError):

@@ -38,8 +38,7 @@ def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Findin
 
 def check_names(scenario: Scenario) -> tuple[str, ...]:
     """Names of all checks of a run as results show them: the universal ones, then the scenario's own."""
-    universal = (getattr(scenario.universal, field) for field in UniversalSettings.model_fields)
-    return tuple(check.name or check.kind for check in (*universal, *scenario.checks))
+    return (*UniversalSettings.model_fields, *(check.name or check.kind for check in scenario.checks))
 
 
 def _must_exist(
@@ -47,7 +46,7 @@ def _must_exist(
 ) -> Iterator[Finding]:
     choices = list(choices)
     if name not in choices:
-        yield Finding(path, f"no {what} '{name}'" + near_misses(name, choices), at_key)
+        yield Finding(path, f"no {what} {describe(name)}" + near_misses(name, choices), at_key)
 
 
 def _objects_and_patches(scenario: Scenario) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from wbmpc.scenario.json_schema import items_expected_at, keys_allowed_at
-from wbmpc.scenario.wording import KeyPath, describe, near_misses
+from wbmpc.scenario.wording import KeyPath, closest, describe, items, near_misses
 
 EXPECTED = {
     "float_type": "a number",
@@ -27,6 +27,8 @@ BOUNDS = {"greater_than": ("gt", ">"), "greater_than_equal": ("ge", "≥"), "les
     "less_than_equal": ("le", "≤")
 }
 
+MAX_FINDINGS = 100  # nobody mends more in one go
+
 
 @dataclass(frozen=True, slots=True)
 class Finding:
@@ -39,24 +41,32 @@ class Finding:
 
 def diagnose(error: ValidationError, data: Any) -> list[Finding]:
     """The findings behind a validation error, consequences of another finding left out."""
-    details = error.errors(include_url=False)
+    details = error.errors(include_url=False)[:MAX_FINDINGS]
     located = [(_key_path(detail, data), detail) for detail in details]
-    wrong_kinds = {
-        path[:-1] for path, detail in located if path[-1:] == ("kind",) and detail["type"] == "literal_error"
-    }
-    findings: list[Finding] = []
+    findings: dict[KeyPath, Finding] = {}
     for path, detail in located:
-        if path[:-1] in wrong_kinds and path[-1] != "kind":
+        if not _is_consequence(path, detail, located, data):
+            finding = _finding(path, detail, data)
+            findings.setdefault(finding.path, finding)
+    return list(findings.values())
+
+
+def _is_consequence(
+    path: KeyPath, detail: ErrorDetails, located: list[tuple[KeyPath, ErrorDetails]], data: Any
+) -> bool:
+    """Whether another error explains this one: one mistake, one message."""
+    for other_path, other in located:
+        block, key = other_path[:-1], other_path[-1:]
+        if other is detail:
             continue
-        finding = _finding(path, detail, data)
-        if finding.path not in [other.path for other in findings]:
-            findings.append(finding)
-    mistyped = {
-        (*finding.path[:-1], match[1])
-        for finding in findings
-        if finding.at_key and (match := re.search(r"did you mean '(.+)'\?$", finding.message))
-    }
-    return [finding for finding in findings if not (finding.path in mistyped and "missing" in finding.message)]
+        if key == ("kind",) and other["type"] == "literal_error" and path[: len(block)] == block:
+            return True  # the kind is wrong, so that every other key of the block is judged by the wrong schema
+        if detail["type"] == "too_short" and len(other_path) > len(path) and other_path[: len(path)] == path:
+            return True  # pydantic counts valid items only
+        is_mistyped = detail["type"] == "missing" and other["type"] == "extra_forbidden" and path[:-1] == block
+        if is_mistyped and closest(str(key[0]), keys_allowed_at(block, data)) == path[-1]:
+            return True
+    return False
 
 
 def _key_path(detail: ErrorDetails, data: Any) -> KeyPath:
@@ -88,14 +98,17 @@ def _finding(path: KeyPath, detail: ErrorDetails, data: Any) -> Finding:
         return Finding((*path, "kind"), "required key is missing", at_key=True)
     if kind == "union_tag_invalid":
         choices = re.findall(r"'([^']*)'", str(context["expected_tags"]))
-        return Finding((*path, "kind"), f"unknown kind '{context['tag']}'" + near_misses(str(context["tag"]), choices))
+        return Finding(
+            (*path, "kind"), f"unknown kind {describe(context['tag'])}" + near_misses(str(context["tag"]), choices)
+        )
     if kind == "literal_error":
         choices = re.findall(r"'([^']*)'", str(context["expected"]))
         return Finding(path, f"expected {context['expected']}, got {describe(given)}" + _hint(given, choices))
     if kind == "finite_number":
         return Finding(path, f"must be a finite number, got {describe(given)}")
     if kind == "string_pattern_mismatch":
-        return Finding(path, f"{describe(given)} is not a valid name: {_pattern_in_words(context['pattern'])}")
+        message = f"{describe(given)} is not a valid name: {_pattern_in_words(context['pattern'])}"
+        return Finding(path, message, at_key=detail["loc"][-1] == "[key]")
     if kind == "string_too_short":
         return Finding(path, "must not be empty")
     if kind in EXPECTED:
@@ -114,9 +127,10 @@ def _wrong_length(path: KeyPath, detail: ErrorDetails, data: Any) -> Finding:
     expected = items_expected_at(path, data)
     if expected is None:
         context = detail.get("ctx", {})
-        bound = f"at least {context['min_length']}" if "min_length" in context else f"at most {context['max_length']}"
-        return Finding(path, f"must have {bound} item(s), got {count}")
-    return Finding(path, f"expected {expected} items, got {count}")
+        least = "min_length" in context
+        bound = f"at least {items(context['min_length'])}" if least else f"at most {items(context['max_length'])}"
+        return Finding(path, f"must have {bound}, got {count}")
+    return Finding(path, f"expected {items(expected)}, got {count}")
 
 
 def _hint(given: Any, choices: list[str]) -> str:

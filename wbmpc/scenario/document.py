@@ -51,4 +51,4 @@ def located_problem(name: str, text: str, mark: Mark, message: str) -> Problem:
     start = max(0, mark.column - 100)
     indent = "".join("\t" if character == "\t" else " " for character in source[start : mark.column])
     excerpt = f"{source[start : start + 160].rstrip()}\n{indent}^"
-    return Problem(f"{name}:{mark.line + 1}:{mark.column + 1}", message, excerpt)
+    return Problem(f"{name}:{mark.line + 1}:{mark.column + 1}", message, excerpt if source else "")

@@ -39,7 +39,11 @@ def _node_at(path: KeyPath, data: Any) -> Mapping[str, Any]:
         if isinstance(part, int):
             node = node["prefixItems"][part] if part < len(node.get("prefixItems", ())) else node.get("items", {})
         else:
-            node = node.get("properties", {}).get(part) or node.get("additionalProperties") or {}
+            free = [
+                *node.get("patternProperties", {}).values(),
+                node.get("additionalProperties"),
+            ]  # of a mapping by name
+            node = node.get("properties", {}).get(part) or free[0] or {}
         node = _resolve(node, data)
     return node
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from wbmpc.errors import Problem, ScenarioError
-from wbmpc.scenario.wording import KeyPath, describe, dotted_path, near_misses
+from wbmpc.scenario.wording import KeyPath, describe, dotted_path, items, near_misses
 from wbmpc.scenario.yaml_reader import parse_value
 
 
@@ -95,12 +95,12 @@ def _part(node: Any, text: str, *, is_last: bool, path: KeyPath) -> str | int:
     where = f" in {dotted_path(path)}" if path else ""
     if isinstance(node, list):
         if not text.isascii() or not text.isdigit() or int(text) >= len(node):
-            raise UnknownPath(f"'{text}' is not an index{where}, which has {len(node)} items counted from 0")
+            raise UnknownPath(f"'{text}' is not an index{where}, which has {items(len(node))}, counted from 0")
         return int(text)
     if not isinstance(node, dict):
         raise UnknownPath(f"{dotted_path(path)} is {describe(node)} and has no part '{text}'")
     if not text:
         raise UnknownPath("empty part in the dotted path")
     if text not in node and not is_last:
-        raise UnknownPath(f"unknown key '{text}'{where}" + near_misses(text, list(node)))
+        raise UnknownPath(f"unknown key {describe(text)}{where}" + near_misses(text, list(node)))
     return text

@@ -7,7 +7,7 @@ from pathlib import Path
 from wbmpc.errors import Problem, ScenarioError
 from wbmpc.scenario.wording import near_misses
 
-MAX_BYTES = 1_000_000  # a scenario is a page or two; more is a mistake and would take minutes to parse
+MAX_BYTES = 200_000  # a scenario is a page or two; more is a mistake, and parsing it would take many seconds
 
 
 def read_text(path: Path, name: str) -> str:
@@ -30,7 +30,7 @@ def read_text(path: Path, name: str) -> str:
             raise fail("is not a regular file")
         size = path.stat().st_size
         if size > MAX_BYTES:
-            raise fail(f"is too large for a scenario: {size / 1e6:.1f} MB, at most {MAX_BYTES / 1e6:g} MB")
+            raise fail(f"is too large for a scenario: {size / 1e3:.0f} kB, at most {MAX_BYTES / 1e3:.0f} kB")
         raw = path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a NUL in the file's name
         raise fail(f"cannot be read: {getattr(error, 'strerror', None) or error}") from None

@@ -68,7 +68,8 @@ def _experiment_findings(scenario: Scenario) -> Iterator[Finding]:
         extra = [check.model_dump(mode="json") for check in experiment.checks]
         changed, findings = _changed(document, changes, source=scenario.source, extra_checks=extra)
         for finding in findings:
-            yield Finding((*path, "set", _culprit(document, changes, finding.path)), _blame(finding, document, changes))
+            blamed = blamed_changes(document, changes, finding.path) or list(changes)
+            yield Finding((*path, "set", blamed[0]), _blame(finding, document, changes), finding.at_key)
         if experiment.failing and experiment.expect == "pass":
             yield Finding((*path, "failing"), "only with 'expect: fail'", at_key=True)
         for index, check in enumerate(experiment.failing if changed else ()):
@@ -120,10 +121,6 @@ def _changed(
         set_value(changed, key, value)
     changed["checks"] = [*changed["checks"], *(extra_checks or ())]
     return validate(changed, source=source, experiments=False)
-
-
-def _culprit(document: Mapping[str, Any], changes: Mapping[str, Any], path: KeyPath) -> str:
-    return (blamed_changes(document, changes, path) or list(changes))[0]
 
 
 def _blame(finding: Finding, document: Mapping[str, Any], changes: Mapping[str, Any]) -> str:

@@ -27,10 +27,21 @@ def describe(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:56]}...{text[-1]}"
 
 
+def items(count: int) -> str:
+    """1 -> "1 item", 3 -> "3 items"."""
+    return f"{count} item{'' if count == 1 else 's'}"
+
+
+def closest(word: str, choices: Iterable[str]) -> str | None:
+    """The choice that a mistyped word most likely means, None when none is similar."""
+    matches = difflib.get_close_matches(word, sorted(choices), n=1, cutoff=0.6)
+    return matches[0] if matches else None
+
+
 def near_misses(word: str, choices: Iterable[str]) -> str:
     """A hint for a mistyped word: ", did you mean 'friction'?", or the choices, or nothing when there are none."""
     choices = sorted(choices)
-    matches = difflib.get_close_matches(word, choices, n=1, cutoff=0.6)
-    if matches:
-        return f", did you mean '{matches[0]}'?"
+    match = closest(word, choices)
+    if match:
+        return f", did you mean '{match}'?"
     return f", choices: {', '.join(choices)}" if choices else ""

@@ -1,0 +1,330 @@
+"""Malformed files: one clear line each, at the place where a text editor finds the mistake."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from base_scenario import BASE, edited, write
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from wbmpc.errors import ScenarioError
+from wbmpc.scenario import load_scenario
+
+# (what is wrong, text, the part of the text where the problem must point, message)
+MISTAKES = [
+    (
+        "unknown key",
+        edited("yaw: 0.0, friction", "yaw: 0.0, frction"),
+        "frction",
+        "world.objects.table.frction: unknown key, did you mean 'friction'?",
+    ),
+    (
+        "mistyped required key",
+        edited("target:", "tarjet:"),
+        "tarjet",
+        "tasks.0.tarjet: unknown key, did you mean 'target'?",
+    ),
+    ("missing key", edited("duration: 12.0\n", ""), "name", "duration: required key is missing"),
+    ("wrong type", edited("duration: 12.0", "duration: '12'"), "'12'", "duration: expected a number, got '12'"),
+    (
+        "boolean for a number",
+        edited("hold: 2.0\n", "hold: true\n"),
+        "true",
+        "tasks.0.hold: expected a number, got true",
+    ),
+    ("fraction for an integer", edited("seed: 3", "seed: 3.0"), "3.0", "seed: expected a whole number, got 3.0"),
+    ("YAML 1.1 boolean", edited("seed: 3", "seed: on"), "on\n", "seed: expected a whole number, got 'on'"),
+    ("YAML 1.1 base 60", edited("duration: 12.0", "duration: 0:12"), "0:12", "duration: expected a number, got '0:12'"),
+    ("negative mass", edited("mass_scale: 1.0", "mass_scale: -1.0"), "-1.0", "plant.mass_scale: must be > 0, got -1.0"),
+    ("NaN", edited("start: 0.5", "start: .nan"), ".nan", "tasks.0.start: must be a finite number, got nan"),
+    (
+        "infinity",
+        edited("[0.44, 0.05, 0.3]", "[0.44, -.inf, 0.3]"),
+        "-.inf",
+        "tasks.0.target.1: must be a finite number, got -inf",
+    ),
+    ("overflow", edited("start: 0.5", "start: 1e999"), "1e999", "tasks.0.start: must be a finite number, got inf"),
+    (
+        "wrong length",
+        edited("[0.44, 0.05, 0.3]", "[0.44, 0.05]"),
+        "[0.44, 0.05]",
+        "tasks.0.target: expected 3 items, got 2",
+    ),
+    (
+        "too many items",
+        edited("position: [0.3, 0.0]", "position: [0.3, 0.0, 0.1]"),
+        "[0.3, 0.0, 0.1]",
+        "world.objects.table.position: expected 2 items, got 3",
+    ),
+    (
+        "unknown kind",
+        edited("kind: reach\n", "kind: raech\n"),
+        "raech",
+        "tasks.0.kind: unknown kind 'raech', did you mean 'reach'?",
+    ),
+    (
+        "unknown choice",
+        edited("face: top", "face: topp"),
+        "topp",
+        "patches.right.face: expected 'top', 'bottom', 'front', 'back', 'left' or 'right', "
+        "got 'topp', did you mean 'top'?",
+    ),
+    (
+        "unsafe name",
+        edited("name: base", "name: ../base"),
+        "../base",
+        "name: '../base' is not a valid name: letters, digits, '_' and '-' only, at most 64, "
+        "beginning with a letter or digit",
+    ),
+    ("duplicate key", edited("seed: 3", "seed: 3\nseed: 4"), "seed: 4", "seed: duplicate key, first on line 3"),
+    (
+        "recursive alias",
+        edited("initial: {keyframe: home, joints: {elbow: 0.1}}", "initial: &a {joints: {elbow: *a}}"),
+        "elbow: *a",
+        "initial.joints.elbow: recursive reference, the alias contains itself",
+    ),
+    ("undefined alias", edited("seed: 3", "seed: *b"), "*b", "not valid YAML: found undefined alias 'b'"),
+    ("merge key", edited("seed: 3", "<<: {seed: 3}"), "<<", "<<: merge keys are not supported"),
+    ("foreign tag", edited("seed: 3", "seed: !!python/name:os 3"), "!!python", "seed: unknown tag !!python/name:os"),
+    ("key that is a number", edited("seed: 3", "3: 3"), "3: 3", "a key must be text, got '3'"),
+    (
+        "syntax",
+        edited("mass_scale: 1.0}", "mass_scale: 1.0"),
+        ": {physics",
+        "not valid YAML: expected ',' or '}', but got ':'",
+    ),
+    (
+        "unreachable horizon",
+        edited("mass_scale: 1.0}", "mass_scale: 1.0}\nplanner: {horizon_steps: 64, horizon_step: 0.5}"),
+        "64",
+        "planner.horizon_steps: the horizon of 32 s is longer than the run of 12 s",
+    ),
+    (
+        "arrives before it starts",
+        edited("arrive_by: 4.0", "arrive_by: 0.4"),
+        "0.4\n",
+        "tasks.0.arrive_by: must be later than start (0.5 s), got 0.4 s",
+    ),
+    (
+        "task outlives the run",
+        edited("hold: 2.0\n", "hold: 8.0\n"),
+        "kind: reach\n",
+        "tasks.0: ends at 14.5 s, the run already at 12 s (duration)",
+    ),
+    (
+        "push after the end",
+        edited("time: 2.0", "time: 12.0"),
+        "12.0, dur",
+        "disturbances.0.time: ends at 12.1 s, the run already at 12 s (duration)",
+    ),
+    (
+        "non-divisible rates",
+        edited("planner_rate: 100", "planner_rate: 130"),
+        "130",
+        "loop.planner_rate: 130 Hz does not divide loop.physics_rate (1000 Hz)",
+    ),
+    (
+        "delay between two ticks",
+        edited("planner_delay: 0.01", "planner_delay: 0.0105"),
+        "0.0105",
+        "loop.planner_delay: 0.0105 s is not a whole number of physics steps (1/1000 s)",
+    ),
+    (
+        "empty checks",
+        edited(
+            "checks:\n  - {kind: reach, max: 0.01, hold: 2.0}\n  - {kind: contact_patches, allowed: [right]}",
+            "checks: []",
+        ),
+        "[]",
+        "checks: must have at least 1 item, got 0",
+    ),
+    (
+        "same check twice",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: reach, max: 0.1, hold: 2.0}"),
+        "reach, max: 0.1,",
+        "checks.1.kind: a second check called 'reach', give it a name of its own (key 'name')",
+    ),
+    (
+        "patch on nothing",
+        edited("{on: table", "{on: tabel"),
+        "tabel",
+        "patches.right.on: no object 'tabel', did you mean 'table'?",
+    ),
+    (
+        "patch off its face",
+        edited("[0.04, -0.1]", "[0.14, -0.1]"),
+        "0.14",
+        "patches.right.offset.0: off the face: 0.14 m from the centre, the face ends at 0.1 m",
+    ),
+    (
+        "check names a patch",
+        edited("allowed: [right]", "allowed: [rigt]"),
+        "rigt",
+        "checks.1.allowed.0: no patch 'rigt', did you mean 'right'?",
+    ),
+    (
+        "unknown robot",
+        edited("robot: tiny.xml", "robot: tin.xml"),
+        "tin.xml",
+        "robot: no such file: 'tin.xml' relative to the scenario's directory",
+    ),
+    (
+        "unknown joint",
+        edited("elbow: 0.1", "elbo: 0.1"),
+        "elbo:",
+        "initial.joints.elbo: no joint 'elbo', did you mean 'elbow'?",
+    ),
+    (
+        "unknown body",
+        edited("body: torso", "body: trso"),
+        "trso",
+        "disturbances.0.body: no body 'trso', did you mean 'torso'?",
+    ),
+    (
+        "unknown keyframe",
+        edited("keyframe: home", "keyframe: hom"),
+        "hom,",
+        "initial.keyframe: no keyframe 'hom', did you mean 'home'?",
+    ),
+    (
+        "object named as a robot geom",
+        BASE.replace("table", "foot"),
+        "foot:",
+        "world.objects.foot: the robot has a geom of this name",
+    ),
+    (
+        "counterfactual of nothing",
+        edited("table.present", "tabel.present"),
+        "world.objects.tabel.present",
+        "counterfactuals.absent.set.world.objects.tabel.present: "
+        "unknown key 'tabel' in world.objects, did you mean 'table'?",
+    ),
+    (
+        "counterfactual with a bad value",
+        edited("present: false", "present: 0"),
+        "0}\n    expect",
+        "counterfactuals.absent.set.world.objects.table.present: expected true or false, got 0",
+    ),
+    (
+        "counterfactual fails an unknown check",
+        edited("failing: [reach]", "failing: [raech]"),
+        "raech",
+        "counterfactuals.absent.failing.0: no check 'raech', did you mean 'reach'?",
+    ),
+    (
+        "varies nothing",
+        edited("key: tasks.0.target.0", "key: tasks.0.tarjet"),
+        "tasks.0.tarjet",
+        "sweep.variations.0.key: unknown key, did you mean 'target'?",
+    ),
+    (
+        "varies beyond a list",
+        edited("key: tasks.0.target.0", "key: tasks.1.target"),
+        "tasks.1.target",
+        "sweep.variations.0.key: '1' is not an index in tasks, which has 1 item, counted from 0",
+    ),
+    (
+        "varies into the invalid",
+        edited("key: tasks.0.target.0, uniform: [0.42, 0.46]", "key: tasks.0.start, uniform: [0.4, 4.5]"),
+        "[0.4, 4.5]",
+        "sweep.variations.0.uniform: tasks.0.arrive_by: must be later than start (4.5 s), got 4 s",
+    ),
+    (
+        "no distribution",
+        edited(", uniform: [0.42, 0.46]", ""),
+        "{key: ",
+        "sweep.variations.0: needs exactly one of 'uniform' and 'choice'",
+    ),
+    (
+        "empty range",
+        edited("[0.42, 0.46]", "[0.46, 0.42]"),
+        "{key: ",
+        "sweep.variations.0: 'uniform' needs its lower bound first, got [0.46, 0.42]",
+    ),
+    ("YAML 1.1 directive", "%YAML 1.1\n---\n" + BASE, "%YAML", "YAML 1.2 only, remove the %YAML directive"),
+    ("two documents", BASE + "---\na: 1\n", "---", "not valid YAML: found another document"),
+    ("a list", "- 1\n", "- 1", "expected a mapping of scenario keys, got a list"),
+    ("empty", "", "", "the file is empty, expected a mapping of scenario keys"),
+]
+
+
+@pytest.mark.parametrize(("text", "where", "message"), [row[1:] for row in MISTAKES], ids=[row[0] for row in MISTAKES])
+def test_one_located_line(tmp_path, text, where, message):
+    path = write(tmp_path, text)
+    with pytest.raises(ScenarioError) as raised:
+        load_scenario(path)
+    index = text.index(where)
+    line, column = text.count("\n", 0, index) + 1, index - (text.rfind("\n", 0, index) + 1) + 1
+    assert str(raised.value) == f"{path}:{line}:{column}: {message}"
+    excerpt = raised.value.problems[0].excerpt
+    if text:
+        source, caret = excerpt.split("\n")
+        assert source == text.splitlines()[line - 1]
+        assert caret == " " * (column - 1) + "^"
+    assert raised.value.exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("content", "line"),
+    [
+        (b"seed: 1\n# " + b"x" * 300_000, "{path}: is too large for a scenario: 300 kB, at most 200 kB"),
+        (b"seed: 1\n\x00\x01", "{path}:2:1: not a text file (NUL byte)"),
+        (b"seed: 1\nname: caf\xe9\n", "{path}:2:10: not a UTF-8 text file (byte 0xe9)"),
+        (b"\x89PNG\r\n\x1a\n", "{path}:1:1: not a UTF-8 text file (byte 0x89)"),
+        (b"seed: \x07\n", "{path}:1:7: character not allowed: #x0007"),
+        (b"a: " + b"[" * 2000, "{path}:1:1: nested too deeply"),
+    ],
+    ids=["huge", "NUL", "latin-1", "png", "control character", "deep"],
+)
+def test_files_that_are_no_text(tmp_path, content, line):
+    path = write(tmp_path, content)
+    with pytest.raises(ScenarioError) as raised:
+        load_scenario(path)
+    assert str(raised.value) == line.format(path=path)
+
+
+def test_paths_that_are_no_file(tmp_path):
+    write(tmp_path, name="reach.yaml")
+    for name, message in [("", "is a directory"), ("raech.yaml", "no such file, did you mean 'reach.yaml'?")]:
+        with pytest.raises(ScenarioError, match=re.escape(message)):
+            load_scenario(tmp_path / name)
+
+
+def test_aliases_cannot_explode(tmp_path):
+    levels = "".join(f"l{i}: &l{i} [{', '.join([f'*l{i - 1}'] * 9)}]\n" for i in range(1, 9))
+    with pytest.raises(ScenarioError, match="more than 20000 values"):
+        load_scenario(write(tmp_path, "l0: &l0 [1]\n" + levels))
+
+
+def test_every_mistake_is_reported_in_the_order_of_the_file(tmp_path):
+    text = (
+        BASE.replace("friction: 0.9", "frction: 0.9")
+        .replace("hold: 2.0\n", "hold: -2.0\n")
+        .replace("seed: 3", "sed: 3")
+    )
+    with pytest.raises(ScenarioError) as raised:
+        load_scenario(write(tmp_path, text))
+    lines = [int(problem.place.split(":")[-2]) for problem in raised.value.problems]
+    assert lines == [3, 9, 17]
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_damaged_text_is_read_or_refused_in_single_lines(tmp_path, data):
+    """Whatever a slip of the hand makes of a file, there is a scenario or a ScenarioError; never another exception."""
+    start = data.draw(st.integers(0, len(BASE) - 1))
+    length = data.draw(st.integers(0, 12))
+    text = data.draw(st.text(st.sampled_from("[]{}:,-*&!|>'\"#%@`? \n\t0.eé\x85"), max_size=6))
+    problems = _problems(write(tmp_path, BASE[:start] + text + BASE[start + length :]))
+    assert all(problem.isprintable() for problem in problems)
+
+
+def _problems(path):
+    try:
+        load_scenario(path)
+    except ScenarioError as error:
+        assert error.problems  # noqa: PT017 - the property is about whatever is raised, if anything is
+        return [str(problem) for problem in error.problems]
+    return []

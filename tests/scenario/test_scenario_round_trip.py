@@ -1,0 +1,114 @@
+"""Random valid scenarios survive being written and read back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from base_scenario import edited, load, write
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+
+from wbmpc.scenario import load_scenario
+
+NAMES = st.from_regex(r"\A[A-Za-z][A-Za-z0-9_]{0,12}\Z").filter(lambda name: name not in ("floor", "foot", "forearm"))
+
+
+def numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    """Floats whose decimal text is not round: a lossy writer would show."""
+    return st.floats(low, high, allow_subnormal=False)
+
+
+def triples(low: float, high: float) -> st.SearchStrategy[list[float]]:
+    return st.lists(numbers(low, high), min_size=3, max_size=3)
+
+
+BOXES = st.fixed_dictionaries(
+    {
+        "kind": st.just("box"),
+        "size": triples(0.01, 2.0),
+        "position": st.lists(numbers(-3, 3), min_size=2, max_size=2),
+    },
+    optional={"bottom": numbers(0, 1), "yaw": numbers(-3, 3), "friction": numbers(0.1, 2), "present": st.booleans()},
+)
+REACHES = st.builds(
+    lambda target, start, travel, hand: {
+        "kind": "reach",
+        "hand": hand,
+        "target": target,
+        "start": start,
+        "arrive_by": start + travel,
+    },
+    triples(-1, 1),
+    numbers(0, 2),
+    numbers(0.1, 2),
+    st.sampled_from(["auto", "left", "right"]),
+)
+HEIGHTS = st.lists(numbers(0.1, 9.0), min_size=1, max_size=4, unique=True).map(
+    lambda times: {"kind": "com_height", "waypoints": [{"time": t, "height": 0.2 + t / 100} for t in sorted(times)]}
+)
+PUSHES = st.fixed_dictionaries(
+    {"kind": st.just("impulse"), "body": st.sampled_from(["torso", "arm"]), "time": numbers(0, 9)}
+    | {"impulse": triples(-3, 3)}
+)
+CHECKS = st.sampled_from([{"kind": "upright_at_end"}, {"kind": "torque_peak", "max": 0.9, "name": "on"}])
+
+
+@st.composite
+def documents(draw: st.DrawFn) -> dict[str, object]:
+    objects = draw(st.dictionaries(NAMES, BOXES, max_size=3))
+    patches = {}
+    for name in draw(st.lists(NAMES, max_size=4, unique=True)) if objects else []:
+        face = draw(st.sampled_from(["top", "bottom", "front", "back", "left", "right"]))
+        patches[name] = {"on": draw(st.sampled_from(sorted(objects))), "face": face, "offset": [0.0, 0.004]}
+    tasks = [draw(REACHES), draw(HEIGHTS), {"kind": "stand"}]
+    return {
+        "name": draw(st.from_regex(r"\A[A-Za-z0-9][A-Za-z0-9_-]{0,12}\Z")),
+        "description": draw(st.text(max_size=30)),
+        "robot": "tiny.xml",
+        "seed": draw(st.integers(0, 2**63 - 1)),
+        "duration": 10.0,
+        "world": {"floor": {"friction": draw(numbers(0.1, 2))}, "objects": objects},
+        "patches": patches,
+        "tasks": draw(st.permutations(tasks))[: draw(st.integers(1, 3))],
+        "disturbances": draw(st.lists(PUSHES, max_size=2)),
+        "plant": {"friction": draw(st.none() | numbers(0.1, 2)), "body_mass_scale": {"arm": draw(numbers(0.5, 2))}},
+        "checks": [draw(CHECKS)],
+    }
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(document=documents())
+def test_written_scenario_reads_back_equal(tmp_path: Path, document: dict[str, object]) -> None:
+    path = write(tmp_path, b"", name="drawn.yaml")
+    yaml = YAML()
+    yaml.allow_unicode = False
+    with path.open("w") as stream:
+        yaml.dump(document, stream)
+    scenario = load_scenario(path)
+    _assert_holds(scenario.to_document(), document)
+    effective = write(tmp_path, scenario.to_yaml(), name="effective.yaml")
+    again = load_scenario(effective)
+    assert again.to_document() == scenario.to_document()
+
+
+def test_text_that_yaml_would_break_survives(tmp_path: Path) -> None:
+    text = edited("name: base", 'name: base\ndescription: "\\x85 \\u2028 é: #\\n\\ton"')
+    scenario = load(tmp_path, text)
+    assert scenario.description == "\x85 \u2028 é: #\n\ton"
+    assert load(tmp_path, scenario.to_yaml()).description == scenario.description
+
+
+def _assert_holds(effective: object, written: object) -> None:
+    """Every value written in the file is in the effective scenario, which has the defaults besides."""
+    if isinstance(written, dict):
+        assert isinstance(effective, dict)
+        for key, value in written.items():
+            _assert_holds(effective[key], value)
+    elif isinstance(written, list):
+        assert isinstance(effective, list)
+        assert len(effective) == len(written)
+        for left, right in zip(effective, written, strict=True):
+            _assert_holds(left, right)
+    else:
+        assert effective == written
