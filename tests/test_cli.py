@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
@@ -18,6 +19,7 @@ import wbmpc.session
 from wbmpc.checks.result import CheckResult
 from wbmpc.cli import app
 from wbmpc.commands.exits import ExitCode, guarded
+from wbmpc.commands.run import dump_last_states
 from wbmpc.counterfactuals import objection
 from wbmpc.errors import WbmpcError
 from wbmpc.scenario import Counterfactual
@@ -54,6 +56,13 @@ def verdict(name: str, checks: list[CheckResult], seed: int = 0) -> Verdict:
     )
 
 
+def recorder_of(last: float) -> Any:
+    """What a run of 300 ticks recorded, as far as the command reads it; `last` is the last velocity."""
+    columns = {name: np.zeros((300, 2)) for name in ("time", "qpos", "qvel", "torque")}
+    columns["qvel"][-1, 1] = last
+    return SimpleNamespace(**columns, column=columns.__getitem__)
+
+
 @pytest.fixture
 def fake(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Replaces the run: everything passes, but torque_peak fails at twice the mass. Collects the scenarios it ran."""
@@ -64,7 +73,7 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         on_progress(scenario.duration)
         weak = scenario.plant.mass_scale == 2.0
         checks = [check("upright_at_end"), check("torque_peak", passed=not weak, value=2.0 if weak else 0.5)]
-        return SimpleNamespace(verdict=verdict(name, checks, scenario.seed), wall_time=0.1)
+        return SimpleNamespace(verdict=verdict(name, checks, scenario.seed), recorder=recorder_of(1.0), wall_time=0.1)
 
     monkeypatch.setattr(wbmpc.session, "run_scenario", run_scenario)
     return ran
@@ -231,6 +240,16 @@ def test_an_internal_error_is_one_line_and_a_traceback_file_and_the_others_still
     suites = ElementTree.parse(tmp_path / "junit.xml").getroot()
     assert [suite.get("failures") for suite in suites] == ["1", "0"]
     assert "Traceback" in call(*words, "--debug").output
+
+
+def test_the_last_states_are_kept_only_when_they_are_not_finite(tmp_path: Path) -> None:
+    path = tmp_path / "run.last_states.npz"
+    dump_last_states(recorder_of(np.inf), path)
+    with np.load(path) as kept:
+        assert kept["qvel"].shape == (200, 2)
+        assert np.isinf(kept["qvel"][-1, 1])
+    dump_last_states(recorder_of(1.0), path)
+    assert not path.exists()
 
 
 def raising(error: BaseException) -> Callable[[], ExitCode]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from pydantic import JsonValue
 
 from wbmpc.commands.exits import ExitCode, report_internal_error
@@ -14,8 +15,11 @@ from wbmpc.commands.tables import final_line, print_checks
 from wbmpc.counterfactuals import objection
 from wbmpc.errors import WbmpcError
 from wbmpc.junit import Case, Suite, case_of, write_junit
+from wbmpc.recorder import Recorder
 from wbmpc.scenario import Counterfactual, Scenario, counterfactual, load_scenario
 from wbmpc.verdict import Verdict
+
+LAST_STATES = 200  # ticks kept of a run that went non-finite
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,7 @@ def _run_job(job: Job, options: RunOptions) -> tuple[ExitCode, Suite, str]:
                 job.scenario, name=job.name, recording=recording, realtime=options.realtime, on_progress=on_progress
             )
         result.verdict.write(options.out / f"{job.name}.json")
+        dump_last_states(result.recorder, options.out / f"{job.name}.last_states.npz")
     except WbmpcError:
         raise
     except Exception as error:
@@ -104,6 +109,15 @@ def _run_job(job: Job, options: RunOptions) -> tuple[ExitCode, Suite, str]:
         text = f"internal error: {type(error).__name__}: {error}"
         return ExitCode.INTERNAL_ERROR, Suite(job.name, 0.0, [Case("run", text)]), f"FAIL {job.name}: {text}"
     return _report(job, result.verdict, result.wall_time)
+
+
+def dump_last_states(recorder: Recorder, path: Path) -> None:
+    """Write the last ticks of a run whose state became non-finite; remove the file of an earlier run otherwise."""
+    if np.isfinite(recorder.qpos).all() and np.isfinite(recorder.qvel).all() and np.isfinite(recorder.torque).all():
+        path.unlink(missing_ok=True)
+        return
+    columns = ("time", "qpos", "qvel", "torque")
+    np.savez(path, **{name: recorder.column(name)[-LAST_STATES:] for name in columns})
 
 
 def _report(job: Job, verdict: Verdict, wall_time: float) -> tuple[ExitCode, Suite, str]:
