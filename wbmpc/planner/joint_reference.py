@@ -38,6 +38,18 @@ class JointReference:
         """Angular velocity (3,) of the torso in world for joint velocities (nv,) [rad/s]."""
         return self._kinematics.jacobian(self._robot.torso_frame)[3:] @ velocity
 
+    def palms(self, velocity: Vector) -> tuple[Vector, Vector]:
+        """Palm positions (2, 3) [m] at the reference and their velocities (2, 3) [m/s] for joint velocities (nv,).
+
+        The tracker follows these and not the task's own path: stage 2 has already weighed the palm against the CoM, so
+        that a target beyond reach never pulls the robot off its balance.
+        """
+        frames = self._robot.palm_frames
+        return (
+            np.array([self._kinematics.position(f) for f in frames]),
+            np.array([self._kinematics.jacobian(f)[:3] @ velocity for f in frames]),
+        )
+
     def advance(self, velocity: Vector, dt: float) -> None:
         """Integrate q̇ (nv,) over dt [s]."""
         self.q = self._robot.integrate(self.q, dt * velocity)

@@ -212,7 +212,8 @@ class Planner:
 
     def _advance(self, state: RobotState, events: list[str]) -> None:
         """Tasks and contacts one plan further."""
-        gate_open = not any(c.expected for c in self._contacts)
+        carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self._contacts)
+        gate_open = carried or not self._needed or self._hopeless >= GIVE_UP_TIME
         for reach in self._reaches:
             before = reach.phase
             reach.advance(state.time, self._period, gate_open=gate_open, palm=self._palms[reach.side])
@@ -491,6 +492,7 @@ class Planner:
         else:
             states[1:, :2] = self._com[:2]
         hands = self._hand_targets()
+        palm_position, palm_velocity = self._reference.palms(velocity)
         contacts = self._contacts
         caps_now = np.array([c.caps(np.zeros(1))[0] for c in contacts])
         caps_next = np.array([c.caps(np.full(1, self._period))[0] for c in contacts])
@@ -511,9 +513,9 @@ class Planner:
             foot_velocity=zero,
             foot_acceleration=zero,
             hand_mode=np.array([int(h[3]) for h in hands]),
-            hand_position=np.array([h[0] for h in hands]),
-            hand_velocity=np.array([h[1] for h in hands]),
-            hand_acceleration=np.array([h[2] for h in hands]),
+            hand_position=palm_position,
+            hand_velocity=palm_velocity,
+            hand_acceleration=zero,
             hand_force=forces[:, 0],
             hand_force_cap=caps_now,
             hand_force_cap_rate=(caps_next - caps_now) / self._period,

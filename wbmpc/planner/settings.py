@@ -31,7 +31,7 @@ class WholeBodySettings(StrictModel):
     jerk_cost: float = Field(1e-5, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
     delta_z_cost: float = Field(1.0, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
     joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
-    com_velocity_cost: float = Field(30.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
+    com_velocity_cost: float = Field(1000.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
     hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
     velocity_cost: float = Field(3e-2, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(1e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
