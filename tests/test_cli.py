@@ -230,12 +230,14 @@ def test_an_internal_error_is_one_line_and_a_traceback_file_and_the_others_still
         return good(scenario, **options)
 
     monkeypatch.setattr(wbmpc.session, "run_scenario", breaks)
+    (tmp_path / "broken.json").write_text("of an earlier run")
     words = ("run", write(tmp_path, "broken"), write(tmp_path, "calm"), "--out", tmp_path)
     result = call(*words)
     assert result.exit_code == 3
     assert "internal error: IndexError: off by one (traceback in" in result.output
     assert "Traceback" not in result.output
     assert "Traceback" in (tmp_path / "broken.traceback.txt").read_text()
+    assert not (tmp_path / "broken.json").exists()
     assert "PASS calm" in result.output
     suites = ElementTree.parse(tmp_path / "junit.xml").getroot()
     assert [suite.get("failures") for suite in suites] == ["1", "0"]

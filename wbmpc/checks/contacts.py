@@ -102,8 +102,8 @@ class ContactPatchesCheck:
             return CheckResult(name, False, float(len(starts)), float(config.min_count), "1", message, when)
         if config.max_count is not None and len(starts) >= config.min_count:
             when = starts[config.max_count] if len(starts) > config.max_count else None
-            return at_most(name, len(starts), config.max_count, "1", message, when=when)
-        return at_least(name, len(starts), config.min_count, "1", message, when=None)
+            return at_most(name, float(len(starts)), float(config.max_count), "1", message, when=when)
+        return at_least(name, float(len(starts)), float(config.min_count), "1", message, when=None)
 
 
 def hand_contact_starts(context: CheckContext) -> list[float]:

@@ -95,6 +95,8 @@ def _run_job(job: Job, options: RunOptions) -> tuple[ExitCode, Suite, str]:
     from wbmpc.session import run_scenario  # MuJoCo, Pinocchio and the solvers: only when something runs
 
     recording = options.out / f"{job.name}.rrd" if options.record else None
+    for suffix in ("json", "rrd", "traceback.txt"):  # results of an earlier run must not pass for this one's
+        (options.out / f"{job.name}.{suffix}").unlink(missing_ok=True)
     try:
         with simulated_time(job.name, job.scenario.duration) as on_progress:
             result = run_scenario(
