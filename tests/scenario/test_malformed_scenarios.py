@@ -88,7 +88,7 @@ MISTAKES = [
     ("undefined alias", edited("seed: 3", "seed: *b"), "*b", "not valid YAML: found undefined alias 'b'"),
     ("merge key", edited("seed: 3", "<<: {seed: 3}"), "<<", "<<: merge keys are not supported"),
     ("foreign tag", edited("seed: 3", "seed: !!python/name:os 3"), "!!python", "seed: unknown tag !!python/name:os"),
-    ("key that is a number", edited("seed: 3", "3: 3"), "3: 3", "a key must be text, got '3'"),
+    ("key that is a number", edited("seed: 3", "3: 3"), "3: 3", "a key must be text, got 3"),
     (
         "syntax",
         edited("mass_scale: 1.0}", "mass_scale: 1.0"),

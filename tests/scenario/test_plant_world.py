@@ -127,10 +127,10 @@ def test_patches_lie_on_the_surface_that_mujoco_has(tmp_path, face, yaw, bottom,
         model, data, patch.position + 0.02 * patch.normal, -patch.normal, flags, 1, -1, geom, normal
     )
     assert model.geom(int(geom[0])).name == patch.object
-    assert distance == pytest.approx(0.02, abs=1e-9)
-    np.testing.assert_allclose(normal, patch.normal, atol=1e-9)
+    assert distance == pytest.approx(0.02, abs=1e-6)  # [m] MuJoCo takes a geom turned by < 1e-6 rad for not turned
+    np.testing.assert_allclose(normal, patch.normal, atol=2e-6)
     local = data.geom("table").xmat.reshape(3, 3).T @ (patch.position - data.geom("table").xpos)
-    np.testing.assert_allclose(local[list(axes)], offset, atol=1e-9)
+    np.testing.assert_allclose(local[list(axes)], offset, atol=1e-6)
 
 
 def _hide_floor(model):

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from wbmpc.scenario.json_schema import items_expected_at, keys_allowed_at
+from wbmpc.scenario.json_schema import is_union_at, items_expected_at, keys_allowed_at
 from wbmpc.scenario.wording import KeyPath, closest, describe, items, near_misses
 
 EXPECTED = {
@@ -73,16 +73,12 @@ def _key_path(detail: ErrorDetails, data: Any) -> KeyPath:
     """The error's path without the parts that name a union's member rather than a key."""
     path: list[str | int] = []
     parts: Sequence[str | int] = [part for part in detail["loc"] if part != "[key]"]
-    for index, part in enumerate(parts):
-        is_last = index == len(parts) - 1
-        names_a_key = is_last and detail["type"] in ("missing", "extra_forbidden")
-        if isinstance(data, dict) and data.get("kind") == part and not names_a_key:
-            continue
-        path.append(part)
-        try:
-            data = data[part]
-        except (KeyError, IndexError, TypeError):
-            data = None
+    was_member = False
+    for part in parts:
+        # A key may have the same name as its block's kind: after the member's name comes a key, whatever its name.
+        was_member = not was_member and is_union_at(tuple(path), data)
+        if not was_member:
+            path.append(part)
     return tuple(path)
 
 

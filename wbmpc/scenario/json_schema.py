@@ -27,14 +27,20 @@ def items_expected_at(path: KeyPath, data: Any) -> int | None:
     return length if isinstance(length, int) and "prefixItems" in _node_at(path, data) else None
 
 
+def is_union_at(path: KeyPath, data: Any) -> bool:
+    """Whether the mapping at `path` is one of several models told apart by `kind`."""
+    return "discriminator" in _node_at(path, data, resolve_last=False)
+
+
 @lru_cache(maxsize=1)
 def _schema() -> dict[str, Any]:
     return scenario_json_schema()
 
 
-def _node_at(path: KeyPath, data: Any) -> Mapping[str, Any]:
-    node = _resolve(_schema(), data)
+def _node_at(path: KeyPath, data: Any, *, resolve_last: bool = True) -> Mapping[str, Any]:
+    node: Mapping[str, Any] = _schema()
     for part in path:
+        node = _resolve(node, data)
         data = _child(data, part)
         if isinstance(part, int):
             node = node["prefixItems"][part] if part < len(node.get("prefixItems", ())) else node.get("items", {})
@@ -44,8 +50,7 @@ def _node_at(path: KeyPath, data: Any) -> Mapping[str, Any]:
                 node.get("additionalProperties"),
             ]  # of a mapping by name
             node = node.get("properties", {}).get(part) or free[0] or {}
-        node = _resolve(node, data)
-    return node
+    return _resolve(node, data) if resolve_last else node
 
 
 def _child(data: Any, part: str | int) -> Any:

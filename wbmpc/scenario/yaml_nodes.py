@@ -69,7 +69,9 @@ class _Builder:
             if key_node.tag == TAG + "merge":
                 raise self._error(mark, (*path, "<<"), "merge keys are not supported")
             if key_node.tag != TAG + "str":
-                raise self._error(mark, path, f"a key must be text, got {describe(key)}")
+                raise self._error(
+                    mark, path, f"a key must be text, got {key if isinstance(key, str) else describe(key)}"
+                )
             inner = (*path, key)
             if key in data:
                 first = self._document.key_marks[inner].line + 1
