@@ -164,3 +164,9 @@ def test_stretches_cover_exactly_the_true_entries(active: list[bool]) -> None:
         rebuilt[start:stop] = True
     assert rebuilt.tolist() == active
     assert all(a[1] < b[0] for a, b in itertools.pairwise(found))  # separated by a false entry
+
+
+def test_one_weak_push_among_strong_ones_proves_nothing() -> None:
+    run = pushed(0.5 * MASS, settled_after=0.2)
+    run.external_force[200:210, 0] = 0.3 * MASS / 0.1
+    assert not recovery(run).passed
