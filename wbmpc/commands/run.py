@@ -118,8 +118,8 @@ def dump_last_states(recorder: Recorder, path: Path) -> None:
     if np.isfinite(recorder.qpos).all() and np.isfinite(recorder.qvel).all() and np.isfinite(recorder.torque).all():
         path.unlink(missing_ok=True)
         return
-    columns = ("time", "qpos", "qvel", "torque")
-    np.savez(path, **{name: recorder.column(name)[-LAST_STATES:] for name in columns})
+    last = {name: recorder.column(name)[-LAST_STATES:] for name in ("time", "qpos", "qvel", "torque")}
+    np.savez(path, allow_pickle=False, **last)
 
 
 def _report(job: Job, verdict: Verdict, wall_time: float) -> tuple[ExitCode, Suite, str]:
