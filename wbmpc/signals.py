@@ -89,6 +89,8 @@ class Setpoint:
     com_acceleration: Vector  # (3,) [m/s²]
     joint_position: Vector  # (nj,) [rad] posture reference, the integral of stage 2's joint velocities
     joint_velocity: Vector  # (nj,) [rad/s] stage 2's joint velocities
+    torso_rotation: Vector  # (3, 3) torso to world, of the posture reference
+    torso_angular_velocity: Vector  # (3,) [rad/s] in world, of the posture reference
     foot_stance: NDArray[np.bool_]  # (2,)
     foot_position: Vector  # (2, 3) [m] sole in world
     foot_yaw: Vector  # (2,) [rad]

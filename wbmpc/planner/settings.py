@@ -34,7 +34,7 @@ class WholeBodySettings(StrictModel):
     com_velocity_cost: float = Field(1000.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
     hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
     velocity_cost: float = Field(3e-2, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
-    position_cost: float = Field(1e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
+    position_cost: float = Field(3e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
     zmp_margin: float = Field(0.015, ge=0, description="[m] inset of the support polygon")
