@@ -90,6 +90,12 @@ class HandContact:
         p, dp, ddp = self._path.at(self._sigma)
         return p, dp * self._rate, ddp * self._rate**2
 
+    def preview(self, times: Vector) -> Vector:
+        """Palm references (n, 3) [m] at `times` (n,) seconds from now, while there is a goal to reach or hold."""
+        if self.touching or self._path is None or self._descent >= 0.0:
+            return np.tile(self.reference()[0], (len(times), 1))
+        return self._path.positions(np.clip(self._sigma + self._rate * times, 0.0, 1.0))
+
     def caps(self, times: Vector) -> Vector:
         """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
         if not self.touching or self.patch is None:

@@ -116,6 +116,8 @@ class Planner:
         events: list[str] = []
         self._observe(state)
         polygon = self._polygon()
+        growth = self._settings.whole_body.zmp_margin_growth
+        polygons = tuple(polygon.shrunk(growth * t) for t in self._preview.times)
         self._advance(state, events)
         self._update_goal(polygon)
         self._candidates.refresh(soles=self._soles, yaws=self._yaws, centre=polygon.centre, iterations=2)
@@ -133,7 +135,7 @@ class Planner:
         plane = polygon.plane_height
         free_model = self._free_model(height, plane, mass)
         common = {
-            "polygons": (polygon,) * self._preview.steps,
+            "polygons": polygons,
             "com_reference": np.tile(polygon.centre, (self._preview.steps, 1)),
             "reach_distance": self._reach_distance(),
             "tasks": self._reference.tasks(
@@ -156,9 +158,9 @@ class Planner:
             )
             if wish is not None:
                 delta_z = wish.delta_z
-                need = self._need(wish, height, free_model, polygon, mass)
+                need = self._need(wish, height, free_model, polygons, mass)
                 self._judge(np.abs(delta_z).max())
-                forces, reports, stage3 = self._contact_stage(need, polygon, state, events)
+                forces, reports, stage3 = self._contact_stage(need, polygons[-1], events)
         model = self._loaded_model(free_model, height, forces, plane, mass)
         motion, solution2 = self._motion_stage.solve(
             self._com[:2], zmp=model, reach=gated[:, :, :2], delta_z_limit=0.0, **common
@@ -252,7 +254,7 @@ class Planner:
         self._quiet = bool(shift < contact.quiet_threshold)
 
     def _contact_stage(
-        self, need: Need, polygon: SupportPolygon, state: RobotState, events: list[str]
+        self, need: Need, polygon: SupportPolygon, events: list[str]
     ) -> tuple[Vector, tuple[CandidateReport, ...], StageReport]:
         """Stage 3: choose a contact when one is needed, and the forces of those that touch."""
         reports: tuple[CandidateReport, ...] = ()
@@ -322,7 +324,7 @@ class Planner:
         sigma = np.zeros(len(times))
         for contact in self._contacts:
             if contact.goal is not None:
-                references[contact.side] = contact.goal
+                references[contact.side] = contact.preview(times)
         for reach in self._reaches:
             if reach.phase == ReachPhase.DONE:
                 continue
@@ -399,18 +401,23 @@ class Planner:
         return ZmpModel(a, b, offset)
 
     def _need(
-        self, wish: HorizontalPlan, height: HeightPlan, model: ZmpModel, polygon: SupportPolygon, mass: float
+        self,
+        wish: HorizontalPlan,
+        height: HeightPlan,
+        model: ZmpModel,
+        polygons: tuple[SupportPolygon, ...],
+        mass: float,
     ) -> Need:
         zmp = model.a[:, None] * wish.com - model.b[:, None] * wish.acceleration
         phantom = np.zeros_like(zmp)
         if self._settings.formulation == "paper":
-            lever = (height.height - polygon.plane_height) * height.acceleration
+            lever = (height.height - polygons[0].plane_height) * height.acceleration
             phantom = mass * lever[:, None] * wish.acceleration / GRAVITY
         return Need(
             delta_z=wish.delta_z,
             zmp=zmp,
             weight=mass * (GRAVITY + height.acceleration),
-            polygons=(polygon,) * self._preview.steps,
+            polygons=polygons,
             phantom=phantom,
         )
 

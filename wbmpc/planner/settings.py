@@ -38,6 +38,9 @@ class WholeBodySettings(StrictModel):
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
     zmp_margin: float = Field(0.015, ge=0, description="[m] inset of the support polygon")
+    zmp_margin_growth: float = Field(
+        0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
+    )
     posture_rate: float = Field(1.0, ge=0, description="[1/s] pull of the joint velocities to the nominal posture")
     torso_cost: float = Field(0.02, ge=0, description="[cost / (rad/s)²] pull of the torso to upright")
     tracking_rate: float = Field(8.0, gt=0, description="[1/s] pull of the joint reference to its CoM, hands and feet")

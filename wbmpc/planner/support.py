@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,6 +74,10 @@ class SupportPolygon:
             centre=vertices.mean(axis=0),
             plane_height=plane_height,
         )
+
+    def shrunk(self, margin: float) -> SupportPolygon:
+        """The same polygon with a further inset of `margin` [m]."""
+        return replace(self, offsets=self.offsets - margin)
 
     def excess(self, point: Vector) -> float:
         """How far `point` (2,) lies outside the shrunk polygon [m]; negative inside (largest edge violation)."""
