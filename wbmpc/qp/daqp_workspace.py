@@ -10,11 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.qp.problem import QuadraticProgram
+from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
 from wbmpc.signals import SolveStatus, Vector
 
 ITERATION_LIMIT = 2000
 PRIMAL_TOLERANCE = 1e-8  # violation of a row scaled to unit norm in the metric of H⁻¹
+SINGULARITY = (1e-9, 1e-7)  # pivots below mark dependent active rows; the second is tried when the first cycles
+DUALITY_GAP = 1e-6  # relative; an honest optimum has about 1e-9
 _SOFT = 8  # bit of daqp's constraint sense
 _STATUS = {
     1: SolveStatus.SOLVED,
@@ -38,6 +41,7 @@ class DaqpWorkspace:
     def __init__(self, problem: QuadraticProgram) -> None:
         self.problem = problem
         self._sense = soft_sense(problem)
+        self._reciprocal = soft_reciprocal(problem)
         self._model: daqp.Model | None = None  # None: nothing to warm-start from
 
     def solve(self, *, matrices_changed: bool = True) -> QpSolution:
@@ -52,20 +56,35 @@ class DaqpWorkspace:
         if self._model is not None:
             # Without `sense`, update keeps the last active set; with it daqp starts cold.
             if matrices_changed:
+                matrix = problem.matrix if problem.rows else None  # the wrapper cannot update an empty matrix
                 flag = self._model.update(
-                    problem.hessian, problem.gradient, problem.matrix, problem.all_upper, problem.all_lower
+                    problem.hessian, problem.gradient, matrix, problem.all_upper, problem.all_lower
                 )
             else:
                 flag = self._model.update(f=problem.gradient, bupper=problem.all_upper, blower=problem.all_lower)
             if flag >= 0:
-                x, _, flag, info = self._model.solve()
-                if _status(flag, x) is SolveStatus.SOLVED:
+                x, cost, flag, info = self._model.solve()
+                if _status(flag, x) is SolveStatus.SOLVED and self._is_optimal(x, cost, info["lam"]):
                     return QpSolution(x, SolveStatus.SOLVED, info["iterations"], perf_counter() - start)
-        model, x, status, iterations = solve_cold(problem, self._sense)
+        model, x, status, iterations = solve_cold(problem, self._sense, self._reciprocal)
         self._model = model if status is SolveStatus.SOLVED else None
         if status is SolveStatus.SOLVED:
             return QpSolution(x, status, iterations, perf_counter() - start)
         return failed(problem, status, iterations, perf_counter() - start)
+
+    def _is_optimal(self, x: Vector, cost: float, multiplier: Vector) -> bool:
+        """Whether the duality gap closes: 2 f(x) - gᵀ x + λᵀ b = 0, b the bound on the side of λ's sign.
+
+        (For x = the minimiser of the Lagrangian, xᵀ H x + gᵀ x + λᵀ C x = 0; the soft rows' terms cancel.) After a
+        large change of the data, a warm-started daqp 0.11 now and then stops at once with multipliers of the wrong
+        sign: feasible, far from optimal, and reported as optimal.
+        """
+        active = multiplier.nonzero()[0]
+        value = multiplier[active]
+        bound = np.where(value > 0.0, self.problem.all_upper[active], self.problem.all_lower[active])
+        dual = float(value.dot(bound))
+        linear = float(self.problem.gradient.dot(x))
+        return abs(2.0 * cost - linear + dual) <= DUALITY_GAP * (1.0 + abs(cost) + abs(linear) + abs(dual))
 
 
 def soft_sense(problem: QuadraticProgram) -> NDArray[np.intc]:
@@ -75,20 +94,48 @@ def soft_sense(problem: QuadraticProgram) -> NDArray[np.intc]:
     return sense
 
 
-def solve_cold(problem: QuadraticProgram, sense: NDArray[np.intc]) -> tuple[daqp.Model, Vector, SolveStatus, int]:
-    """Set up a fresh model and solve it: the model, x (meaningless unless SOLVED), status and iterations."""
+def soft_reciprocal(problem: QuadraticProgram) -> Vector | None:
+    """1 / w of the soft rows (n + m,), None without any. Weights of single rows are exact; the setting rho_soft would
+    count in rows scaled to unit norm."""
+    if not problem.soft_rows.size:
+        return None
+    reciprocal = np.zeros(problem.all_lower.size)
+    reciprocal[problem.variables + problem.soft_rows] = 1.0 / problem.soft_weight[problem.soft_rows]
+    return reciprocal
+
+
+def solve_cold(
+    data: QuadraticProgram | SlackForm, sense: NDArray[np.intc], reciprocal: Vector | None = None
+) -> tuple[daqp.Model, Vector, SolveStatus, int]:
+    """Solve with a fresh model: the model, x (meaningless unless SOLVED), status and iterations.
+
+    daqp 0.11 allocates its working set for n + 1 constraints and one more for each soft row, but on nearly infeasible
+    problems it activates more and writes past the end. So the model is set up on a trivial problem whose rows are all
+    soft, which leaves room for every constraint, and the real data and flags follow as an update.
+    """
+    for singularity in SINGULARITY:
+        model, x, status, iterations = _solve_fresh(data, sense, reciprocal, singularity)
+        if status is not SolveStatus.NUMERICAL_ERROR:
+            break
+    return model, x, status, iterations
+
+
+def _solve_fresh(
+    data: QuadraticProgram | SlackForm, sense: NDArray[np.intc], reciprocal: Vector | None, singularity: float
+) -> tuple[daqp.Model, Vector, SolveStatus, int]:
+    variables, rows = data.gradient.size, data.matrix.shape[0]
     model = daqp.Model()
-    model.settings = {"iter_limit": ITERATION_LIMIT, "primal_tol": PRIMAL_TOLERANCE}
-    flag, _ = model.setup(
-        problem.hessian, problem.gradient, problem.matrix, problem.all_upper, problem.all_lower, sense
-    )
+    model.settings = {"iter_limit": ITERATION_LIMIT, "primal_tol": PRIMAL_TOLERANCE, "sing_tol": singularity}
+    roomy = sense.copy()
+    roomy[variables:] |= _SOFT
+    unit = np.ones(variables + rows)
+    model.setup(np.eye(variables), np.zeros(variables), np.zeros((rows, variables)), unit, np.zeros_like(unit), roomy)
+    matrix = data.matrix if rows else None  # the wrapper cannot update an empty matrix
+    flag = model.update(data.hessian, data.gradient, matrix, data.all_upper, data.all_lower, sense)
     if flag < 0:
-        return model, problem.gradient, _STATUS.get(flag, SolveStatus.NUMERICAL_ERROR), 0
-    if problem.soft_rows.size:
-        # The weights of single rows are exact; the setting rho_soft would count in rows scaled to unit norm.
-        rho = np.zeros(problem.all_lower.size)
-        rho[problem.variables + problem.soft_rows] = 1.0 / problem.soft_weight[problem.soft_rows]
-        model.soft_weights(rho_l=rho, rho_u=rho)
+        return model, data.gradient, _STATUS.get(flag, SolveStatus.NUMERICAL_ERROR), 0
+    if reciprocal is not None:
+        model.soft_weights(rho_l=reciprocal, rho_u=reciprocal)
     x, _, flag, info = model.solve()
     return model, x, _status(flag, x), info["iterations"]
 

@@ -14,7 +14,7 @@ from time import perf_counter
 import highspy
 import numpy as np
 
-from wbmpc.qp.highs_models import build_master, build_qp, run
+from wbmpc.qp.highs_models import HighsQp, build_master, run
 from wbmpc.qp.problem import QuadraticProgram
 from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
@@ -52,14 +52,18 @@ class HighsOuterApproximation:
     def _approximate(self) -> tuple[SolveStatus, Vector | None, int]:
         """Status, optimal z or None, and rounds."""
         form, binary = self._form, self.problem.binary
-        qp = build_qp(form)
-        if qp is None:
+        try:
+            qp = HighsQp(form)
+            floor = self._floor()
+        except np.linalg.LinAlgError:
             return SolveStatus.NUMERICAL_ERROR, None, 0
-        status, z = run(qp, form.variables)  # its cut bounds t from below in the first master
-        if status is not SolveStatus.SOLVED or not binary.size:
+        status, z = qp.solve()
+        if status is SolveStatus.INFEASIBLE or not binary.size:
             return status, z if status is SolveStatus.SOLVED else None, 0
         master = build_master(form, binary, node_limit=self._node_limit, gap=0.1 * _GAP)
-        self._add_cut(master, z)
+        master.changeColBounds(form.variables, floor, np.inf)
+        if status is SolveStatus.SOLVED:  # a good first cut; the floor alone would do
+            self._add_cut(master, z)
         best, best_cost = None, np.inf
         tried: set[bytes] = set()
         for rounds in range(1, self._round_limit + 1):
@@ -71,9 +75,8 @@ class HighsOuterApproximation:
             if key in tried or (best is not None and best_cost - z[-1] <= _GAP * (1.0 + abs(best_cost))):
                 return SolveStatus.SOLVED, best, rounds
             tried.add(key)
-            indices = binary.astype(np.int32)
-            qp.changeColsBounds(binary.size, indices, assignment, assignment)
-            status, z = run(qp, form.variables)
+            qp.fix(binary, assignment)
+            status, z = qp.solve()
             if status is not SolveStatus.SOLVED:
                 # The master found a point with these binaries: a refusal here is HiGHS' failure, not the problem's.
                 return SolveStatus.NUMERICAL_ERROR, None, rounds
@@ -82,6 +85,13 @@ class HighsOuterApproximation:
                 best, best_cost = z, cost
             self._add_cut(master, z)
         return SolveStatus.ITERATION_LIMIT, None, self._round_limit
+
+    def _floor(self) -> float:
+        """A lower bound of f: its minimum without constraints, after adding ½ (x² - x) = 0 for each binary x."""
+        hessian, gradient = self._form.hessian.copy(), self._form.gradient.copy()
+        hessian[self.problem.binary, self.problem.binary] += 1.0
+        gradient[self.problem.binary] -= 0.5
+        return -0.5 * float(gradient @ np.linalg.solve(hessian, gradient))
 
     def _cost(self, z: Vector) -> float:
         return float(0.5 * z @ self._form.hessian @ z + self._form.gradient @ z)
