@@ -14,7 +14,7 @@ from time import perf_counter
 import highspy
 import numpy as np
 
-from wbmpc.qp.highs_models import HighsQp, build_master, run
+from wbmpc.qp.highs_models import FixedQp, build_master, run
 from wbmpc.qp.problem import QuadraticProgram
 from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
@@ -53,7 +53,7 @@ class HighsOuterApproximation:
         """Status, optimal z or None, and rounds."""
         form, binary = self._form, self.problem.binary
         try:
-            qp = HighsQp(form)
+            qp = FixedQp(form)
             floor = self._floor()
         except np.linalg.LinAlgError:
             return SolveStatus.NUMERICAL_ERROR, None, 0

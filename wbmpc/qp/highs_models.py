@@ -6,6 +6,8 @@ import highspy
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.qp.osqp_workspace import OsqpWorkspace
+from wbmpc.qp.problem import QuadraticProgram
 from wbmpc.qp.slack_form import SlackForm
 from wbmpc.signals import SolveStatus, Vector
 
@@ -18,20 +20,20 @@ _STATUS = {
 _SINGULAR = 1e-12  # eigenvalues below this share of the largest count as zero
 
 
-class HighsQp:
-    """The QP with the binaries relaxed or fixed, in two forms that HiGHS' active-set solver is tried on in turn.
+class FixedQp:
+    """The QP with the binaries relaxed or fixed, in forms that are tried in turn.
 
-    Factored: minimise ½ |y|² + gᵀ z with y = F z, where H = Fᵀ F.  Direct: H as it stands. The direct form fails on
-    about 1 % of small problems with a dense H, the factored one on about 5 % of those with a sparse H; no problem was
-    found on which both do.
+    Factored: minimise ½ |y|² + gᵀ z with y = F z, where H = Fᵀ F.  Direct: H as it stands.  HiGHS' active-set solver
+    fails now and then for no reason of the problem's: in the direct form on about 1 % of small problems with a dense
+    H, in the factored one on about 5 % of those with a sparse H, in both on a few of ten thousand. OSQP takes those.
     """
 
     def __init__(self, form: SlackForm) -> None:
         """Raises numpy.linalg.LinAlgError when H is indefinite."""
         self._form = form
-        self._direct: highspy.Highs | None = None  # built when first needed
         self._fixed: tuple[NDArray[np.int32], Vector] | None = None
         self._factored = _factored_qp(form)
+        self._direct: highspy.Highs | None = None  # built when first needed
 
     def fix(self, binary: NDArray[np.int64], values: Vector) -> None:
         """Give these variables these values."""
@@ -44,13 +46,24 @@ class HighsQp:
             return status, z
         if self._direct is None:
             self._direct = _direct_qp(self._form)
-        return self._run(self._direct)
+        status, z = self._run(self._direct)
+        return (status, z) if status in (SolveStatus.SOLVED, SolveStatus.INFEASIBLE) else self._run_osqp()
 
     def _run(self, solver: highspy.Highs) -> tuple[SolveStatus, Vector]:
         if self._fixed is not None:
             indices, values = self._fixed
             solver.changeColsBounds(indices.size, indices, values, values)
         return run(solver, self._form.variables)
+
+    def _run_osqp(self) -> tuple[SolveStatus, Vector]:
+        problem = QuadraticProgram(self._form.variables, self._form.problem.rows)
+        for name in ("hessian", "gradient", "matrix", "all_lower", "all_upper"):
+            getattr(problem, name)[...] = getattr(self._form, name)
+        if self._fixed is not None:
+            indices, values = self._fixed
+            problem.x_lower[indices] = problem.x_upper[indices] = values
+        solution = OsqpWorkspace(problem).solve()
+        return solution.status, solution.x if solution.solved else np.zeros(0)
 
 
 def _factored_qp(form: SlackForm) -> highspy.Highs:
