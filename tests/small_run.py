@@ -85,7 +85,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
     t = k * TICK
     qpos = np.array([0.02 * np.sin(3 * t), 0, 0.3, np.cos(t / 2), 0, 0, np.sin(t / 2), np.sin(5 * t), -np.sin(5 * t)])
     com = qpos[:3] + np.array([0, 0, 0.01])
-    count = k % 5
+    count = k // 10 % 5
     palm = np.array([[0.1, 0.15, 0.25], [0.1, -0.15, 0.25]])
     sole = np.array([[0, 0.05, 0.0], [0, -0.05, 0.0]])
     position = np.zeros((MAX_CONTACTS, 3))

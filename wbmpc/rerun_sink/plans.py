@@ -9,6 +9,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from wbmpc.footage import on_ground
 from wbmpc.rerun_sink.documents import candidate_lines, candidate_table
 from wbmpc.rerun_sink.palette import AXES, FAULT, LEFT, LIMIT, PLANNED, RIGHT
 from wbmpc.rerun_sink.scene import Patch
@@ -64,9 +65,6 @@ def write_plans(
 def _write_horizons(
     stream: Stream, plans: Sequence[PlanReport], time: NDArray[np.float64], ground: NDArray[np.float64]
 ) -> None:
-    def on_ground(points: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-        return np.column_stack([points, np.full(len(points), height + 1e-3)])  # above the floor, or it flickers
-
     stream.strips("/world/com/horizon", time, [[plan.com] for plan in plans])
     zmp = [on_ground(plan.zmp, z) for plan, z in zip(plans, ground, strict=True)]
     stream.strips("/world/zmp/horizon", time, [[line] for line in zmp])

@@ -1,0 +1,177 @@
+"""Off-screen pictures of a run: one moment, a strip of moments, or an animation.
+
+MuJoCo reads MUJOCO_GL when it is first imported: whoever wants pictures imports this module before mujoco, or sets
+the variable. Without it MuJoCo would look for a screen.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("MUJOCO_GL", "egl")
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from wbmpc.errors import WbmpcError
+from wbmpc.footage import Footage
+
+FORMATS = (".png", ".webp", ".gif")
+_METRES_PER_NEWTON = 0.008
+_FORCE_RGBA = (0.24, 0.55, 1.0, 1.0)
+_COM_RGBA = (1.0, 0.65, 0.16, 1.0)
+_SUPPORT_RGBA = (0.10, 0.45, 0.30, 1.0)
+_LEAST_DRAWN_FORCE = 0.2  # [N] a shorter arrow is all head
+_NO_GL = "no off-screen OpenGL (MUJOCO_GL={backend}): {reason}. On Debian: apt-get install {packages}"
+_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Where the picture is taken from; the default is a three-quarter view that follows nothing."""
+
+    azimuth: float = 140.0  # [deg] about z; 90 looks along +y, 180 along -x
+    elevation: float = -14.0  # [deg] negative: from above
+    distance: float = 1.15  # [m] from lookat
+    lookat: tuple[float, float, float] | None = None  # [m] in world; None: halfway up the first picture's CoM
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """Size of a picture and what is drawn over the scene."""
+
+    width: int = 800  # [px]
+    height: int = 800  # [px]
+    camera: Camera = Camera()
+    forces: bool = True  # contact forces, 8 mm a newton
+    balance: bool = True  # CoM, its projection, and the support polygon
+
+
+def render_frames(footage: Footage, times: Sequence[float], picture: Picture = Picture()) -> list[NDArray[np.uint8]]:
+    """Pictures (height, width, 3) of the samples nearest to `times` [s].
+
+    Raises:
+        WbmpcError: a time outside the run, or no OpenGL on this machine.
+    """
+    rows = [footage.index(time) for time in times]
+    model = footage.model
+    data = mujoco.MjData(model)
+    camera = _aim(picture.camera, footage.com[rows[0]] if rows else np.zeros(3))
+    frames = []
+    with _renderer(model, picture) as renderer:
+        for row in rows:
+            data.qpos[: footage.qpos.shape[1]] = footage.qpos[row]
+            mujoco.mj_forward(model, data)
+            renderer.update_scene(data, camera)
+            if picture.forces:
+                _draw_forces(renderer.scene, footage, row)
+            if picture.balance:
+                _draw_balance(renderer.scene, footage, row)
+            frames.append(renderer.render())
+    return frames
+
+
+def save_picture(frames: Sequence[NDArray[np.uint8]], path: Path) -> None:
+    """One frame, or several side by side, as one picture."""
+    _save(Image.fromarray(np.concatenate(list(frames), axis=1)), path)
+
+
+def save_animation(frames: Sequence[NDArray[np.uint8]], path: Path, *, frame_rate: float) -> None:
+    """An endless .webp or .gif at `frame_rate` [Hz]."""
+    if path.suffix.lower() not in (".webp", ".gif"):
+        raise WbmpcError(f"{path}: an animation is a .webp or a .gif")
+    first, *rest = [Image.fromarray(frame) for frame in frames]
+    _save(first, path, save_all=True, append_images=rest, duration=round(1000 / frame_rate), loop=0)
+
+
+def _save(image: Image.Image, path: Path, **options: Any) -> None:
+    if path.suffix.lower() not in FORMATS:
+        raise WbmpcError(f"{path}: unknown kind of picture; choose one of {', '.join(FORMATS)}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        image.save(path, **options)
+    except OSError as error:
+        raise WbmpcError(f"cannot write the picture {path}: {error.strerror or error}") from error
+
+
+@contextmanager
+def _renderer(model: Any, picture: Picture) -> Iterator[Any]:
+    # The model's own off-screen buffer may be smaller than the picture; MuJoCo refuses rather than grow it.
+    model.vis.global_.offwidth = max(model.vis.global_.offwidth, picture.width)
+    model.vis.global_.offheight = max(model.vis.global_.offheight, picture.height)
+    try:
+        renderer = mujoco.Renderer(model, picture.height, picture.width)
+    except Exception as error:  # each GL backend has its own kind
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise WbmpcError(
+            _NO_GL.format(backend=os.environ.get("MUJOCO_GL", ""), reason=reason, packages=_PACKAGES)
+        ) from error
+    try:
+        yield renderer
+    finally:
+        renderer.close()
+
+
+def _aim(settings: Camera, com: NDArray[np.float64]) -> Any:
+    camera = mujoco.MjvCamera()
+    camera.azimuth, camera.elevation, camera.distance = settings.azimuth, settings.elevation, settings.distance
+    # A little above the CoM: head and feet are then about equally far from the edges.
+    camera.lookat[:] = settings.lookat if settings.lookat is not None else com + np.array([0.08, 0.0, 0.0])
+    return camera
+
+
+def _draw_forces(scene: Any, footage: Footage, row: int) -> None:
+    for origin, force in zip(footage.contact_position[row], footage.contact_force[row], strict=True):
+        if np.linalg.norm(force) > _LEAST_DRAWN_FORCE:
+            tip = origin + _METRES_PER_NEWTON * force
+            _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, 0.004, origin, tip, _FORCE_RGBA)
+
+
+def _draw_balance(scene: Any, footage: Footage, row: int) -> None:
+    com, polygon = footage.com[row], footage.support_polygon[row]
+    contacts = footage.contact_position[row]
+    heights = polygon[:, 2] if len(polygon) else contacts[:, 2] if len(contacts) else np.zeros(1)
+    projection = np.array([com[0], com[1], heights.min()])
+    _ball(scene, 0.013, com, _COM_RGBA)
+    _ball(scene, 0.010, projection, _COM_RGBA)
+    _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.0015, com, projection, _COM_RGBA)
+    for start, end in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        if not np.array_equal(start, end):
+            _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.002, start, end, _SUPPORT_RGBA)
+
+
+def _next_geom(scene: Any) -> Any | None:
+    """A free slot of the scene; None when it is full: decoration is then left out."""
+    if scene.ngeom >= scene.maxgeom:
+        return None
+    scene.ngeom += 1
+    return scene.geoms[scene.ngeom - 1]
+
+
+def _ball(scene: Any, radius: float, centre: NDArray[np.float64], rgba: Sequence[float]) -> None:
+    if (geom := _next_geom(scene)) is not None:
+        kind = mujoco.mjtGeom.mjGEOM_SPHERE
+        colour = np.asarray(rgba, np.float32)
+        mujoco.mjv_initGeom(geom, kind, np.full(3, radius), np.asarray(centre, float), np.eye(3).ravel(), colour)
+
+
+def _connect(
+    scene: Any,
+    kind: Any,
+    width: float,
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    rgba: Sequence[float],
+) -> None:
+    if (geom := _next_geom(scene)) is not None:
+        colour = np.asarray(rgba, np.float32)
+        mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.eye(3).ravel(), colour)
+        mujoco.mjv_connector(geom, kind, width, np.asarray(start, float), np.asarray(end, float))

@@ -1,0 +1,132 @@
+"""A recording back into arrays: columns by entity, and the footage for pictures.
+
+A file names no times but those of its samples; everything else (a plan, say) is looked up as the viewer does: the
+latest row at or before the sample.
+"""
+
+from __future__ import annotations
+
+import struct
+import tempfile
+import warnings
+import zlib
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from rerun.chunk import RrdReader
+
+from wbmpc.errors import WbmpcError
+from wbmpc.footage import Footage
+from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
+from wbmpc.rerun_sink.stream import TIMELINE
+
+FloatArray = NDArray[np.float64]
+
+
+class Recording:
+    """One .rrd file written by RerunSink, whole or cut short by a kill.
+
+    Raises:
+        WbmpcError: no such file, or not a recording of this project.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._rows: dict[tuple[str, str], list[tuple[NDArray[Any] | None, list[Any]]]] = {}
+        for chunk in _chunks(path):
+            batch = chunk.to_record_batch()
+            columns = dict(zip(batch.schema.names, batch.columns, strict=True))
+            time = columns.get(TIMELINE)
+            stamps = None if time is None else time.to_numpy(zero_copy_only=False).astype(np.int64) / 1e9
+            for name, values in columns.items():
+                if ":" in name or chunk.is_static:
+                    rows = self._rows.setdefault((chunk.entity_path, name.rsplit(":", 1)[-1]), [])
+                    rows.append((stamps, values))
+
+    def column(self, entity: str, component: str) -> tuple[FloatArray, list[NDArray[Any]]]:
+        """Times (n,) [s] and the n values of a component, in order of time: `column("/state/qpos", "scalars")`."""
+        blocks = [(t, v) for t, v in self._rows.get((entity, component), []) if t is not None]
+        times = np.concatenate([t for t, _ in blocks]) if blocks else np.zeros(0)
+        values = [np.array(row or []) for _, block in blocks for row in block.to_pylist()]  # type: ignore[attr-defined]
+        order = np.argsort(times, kind="stable")
+        return times[order], [values[i] for i in order]
+
+    def static(self, entity: str, component: str) -> list[Any]:
+        """Value of a component that does not change; empty when it is not in the file."""
+        blocks = [v for t, v in self._rows.get((entity, component), []) if t is None]
+        return list(blocks[-1].to_pylist()[-1] or []) if blocks else []  # type: ignore[attr-defined]
+
+    def footage(self) -> Footage:
+        """Everything that pictures need.
+
+        Raises:
+            WbmpcError: the file holds no model or no sample, or another MuJoCo release wrote the model.
+        """
+        model = self._model()
+        time, qpos = self.column("/state/qpos", "scalars")
+        if not len(time):
+            raise WbmpcError(f"{self.path}: no samples; the run ended before the first block was written")
+        com = self._at(time, "/world/com/measured", "positions")
+        return Footage(
+            model=model,
+            time=time,
+            qpos=np.array(qpos),
+            com=np.array(com).reshape(len(time), 3),
+            contact_position=self._at(time, "/world/contacts", "origins"),
+            contact_force=[v / METRES_PER_NEWTON for v in self._at(time, "/world/contacts", "vectors")],
+            support_polygon=self._at(time, "/world/support_polygon", "strips"),
+        )
+
+    def _at(self, time: FloatArray, entity: str, component: str) -> list[FloatArray]:
+        stamps, values = self.column(entity, component)
+        latest = np.searchsorted(stamps, time + 1e-9, side="right") - 1
+        return [np.asarray(values[k], float).reshape(-1, 3) if k >= 0 else np.zeros((0, 3)) for k in latest]
+
+    def _model(self) -> Any:
+        packed, release = self.static("/model", "mjb"), self.static("/model", "mujoco")
+        if not packed:
+            raise WbmpcError(f"{self.path}: not a recording of wbmpc (it holds no model)")
+        if release != [mujoco.__version__]:
+            raise WbmpcError(
+                f"{self.path}: written with MuJoCo {release[0]}, this is {mujoco.__version__}; run it anew"
+            )
+        return mujoco.MjModel.from_binary_path("model.mjb", {"model.mjb": zlib.decompress(bytes(packed[0]))})
+
+
+def _chunks(path: Path) -> list[Any]:
+    if not path.is_file():
+        raise WbmpcError(f"no such recording: {path}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # a killed run's file has no footer, which is no trouble here
+        try:
+            return list(RrdReader(path).stream().to_chunks())
+        except (RuntimeError, ValueError) as error:
+            whole = _whole_messages(path.read_bytes())
+            if not whole:
+                raise WbmpcError(f"{path}: not a readable recording ({str(error).splitlines()[0]})") from error
+        with tempfile.TemporaryDirectory() as folder:
+            repaired = Path(folder) / "repaired.rrd"
+            repaired.write_bytes(whole)
+            try:
+                return list(RrdReader(repaired).stream().to_chunks())
+            except (RuntimeError, ValueError) as error:
+                raise WbmpcError(f"{path}: not a readable recording ({str(error).splitlines()[0]})") from error
+
+
+_FILE_HEADER, _MESSAGE_HEADER = 12, struct.Struct("<QQ")  # kind and length of the payload that follows
+
+
+def _whole_messages(content: bytes) -> bytes:
+    """`content` without the message that a kill cut short, which the strict reader refuses; empty when not a .rrd."""
+    if not content.startswith(b"RRF2"):
+        return b""
+    end = _FILE_HEADER
+    while end + _MESSAGE_HEADER.size <= len(content):
+        _, length = _MESSAGE_HEADER.unpack_from(content, end)
+        if end + _MESSAGE_HEADER.size + length > len(content):
+            break
+        end += _MESSAGE_HEADER.size + length
+    return content[:end]
