@@ -247,3 +247,20 @@ def test_redundant_equalities_are_no_contradiction(backend, rounding):
     problem.lower[3] = problem.upper[3] = problem.lower[3] + 0.5
     assert workspace.solve().status is SolveStatus.INFEASIBLE
     assert make_workspace(backend, problem).solve().status is SolveStatus.INFEASIBLE
+
+
+@pytest.mark.parametrize("number", [2542, 14039, 67924])
+def test_warm_start_from_an_unrelated_problem(number):
+    """Pairs on which daqp 0.11 itself, warm-started, calls a far from optimal point optimal."""
+    soft = number % 4
+    problem = QuadraticProgram(10, 9, np.concatenate([np.zeros(9 - soft), np.full(soft, 50.0)]))
+    workspace = make_workspace("daqp", problem)
+    for seed in (number - 4, number):
+        rng = np.random.default_rng(5_000_000 + seed)
+        problem.copy_from(random_problem(rng, 10, 9, equalities=seed % 3, soft=soft))
+        if seed % 5 == 0:
+            problem.lower[3] += 3.0
+            problem.upper[3] += 3.0
+        solution = workspace.solve()
+    assert solution.solved
+    assert kkt_residual(problem, solution.x) < 1e-8
