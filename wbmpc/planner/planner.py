@@ -223,7 +223,7 @@ class Planner:
                 events.append(f"reach {SIDES[reach.side]}: {before.name.lower()} -> {reach.phase.name.lower()}")
             if reach.phase == ReachPhase.HOLD:
                 short = float(np.linalg.norm(self._palms[reach.side] - reach.target)) - 0.5 * reach.task.tolerance
-                self._shrink = float(np.clip(self._shrink + 1.0 * self._period * short, 0.0, 0.04))
+                self._shrink = float(np.clip(self._shrink + 1.0 * self._period * short, 0.0, 0.02))
         for contact in self._contacts:
             before_phase, patch = contact.phase, self._patch_name(contact.side)
             wanted = float(self._forces[contact.side, 0] @ contact.patch.normal) if contact.patch else 0.0

@@ -37,7 +37,7 @@ class WholeBodySettings(StrictModel):
     position_cost: float = Field(3e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
-    zmp_margin: float = Field(0.015, ge=0, description="[m] inset of the support polygon")
+    zmp_margin: float = Field(0.018, ge=0, description="[m] inset of the support polygon")
     zmp_margin_growth: float = Field(
         0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
     )
@@ -55,7 +55,7 @@ class ContactSettings(StrictModel):
     ramp_time: float = Field(0.3, gt=0, description="[s] ramp of the force cap up and down")
     sensed_force: float = Field(0.3, gt=0, description="[N] normal force that counts as touched")
     approach_clearance: float = Field(0.03, gt=0, description="[m] distance above the patch where the descent begins")
-    approach_speed: float = Field(0.25, gt=0, description="[m/s] mean speed of the hand towards the clearance point")
+    approach_speed: float = Field(0.18, gt=0, description="[m/s] mean speed of the hand towards the clearance point")
     touch_speed: float = Field(0.06, gt=0, description="[m/s] speed of the descent: bounds the impact")
     search_depth: float = Field(0.03, gt=0, description="[m] how far below the patch a descent looks for it")
     force_cost: float = Field(1.0, gt=0, description="[cost] weight of (n·f)²/(m g)²")

@@ -46,9 +46,9 @@ class TrackerSettings(StrictModel):
     force_regularization: float = Field(1e-4, gt=0, description="[cost / N²] of every contact force")
     acceleration_regularization: float = Field(1e-4, gt=0, description="[cost / (rad/s²)²] of every joint")
 
-    foot_friction: float = Field(0.6, gt=0, description="friction coefficient that the soles count on")
-    foot_yaw_radius: float = Field(0.03, gt=0, description="[m] yaw moment / (friction · normal force) of a sole")
-    foot_inset: float = Field(0.007, ge=0, description="[m] inset of the sole's rectangle for its centre of pressure")
+    foot_friction: float = Field(0.35, gt=0, description="friction coefficient that the soles count on")
+    foot_yaw_radius: float = Field(0.02, gt=0, description="[m] yaw moment / (friction · normal force) of a sole")
+    foot_inset: float = Field(0.01, ge=0, description="[m] inset of the sole's rectangle for its centre of pressure")
     joint_velocity_limit: float = Field(5.0, gt=0, description="[rad/s]")
     limit_horizon: float = Field(0.025, gt=0, description="[s] within which a joint may stop before its limit")
     torque_share: float = Field(0.95, gt=0, le=1, description="share of the servo's torque that may be planned")
