@@ -145,7 +145,7 @@ def render_command(
     rate: Annotated[float, typer.Option(min=1, max=100, help="[Hz] frames a second of an animation.")] = 20.0,
     width: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
     height: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
-    azimuth: Annotated[float, typer.Option(help="[deg] direction of view about z: 90 along +y.")] = 140.0,
+    azimuth: Annotated[float, typer.Option(help="[deg] direction of view about z: 90 along +y.")] = 75.0,
     elevation: Annotated[float, typer.Option(help="[deg] negative: from above.")] = -14.0,
     distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.15,
     debug: Debug = False,

@@ -7,11 +7,14 @@ the variable. Without it MuJoCo would look for a screen.
 from __future__ import annotations
 
 import os
+from ctypes.util import find_library
 
-os.environ.setdefault("MUJOCO_GL", "egl")
+# EGL unless only OSMesa is installed. Without either, EGL's failure is the one that is reported.
+os.environ.setdefault("MUJOCO_GL", "osmesa" if find_library("OSMesa") and not find_library("EGL") else "egl")
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,10 +28,11 @@ from wbmpc.errors import WbmpcError
 from wbmpc.footage import Footage
 
 FORMATS = (".png", ".webp", ".gif")
-_METRES_PER_NEWTON = 0.008
+_METRES_PER_NEWTON = 0.015  # of an arrow: longer than in a recording, for a picture cannot be turned
 _FORCE_RGBA = (0.24, 0.55, 1.0, 1.0)
 _COM_RGBA = (1.0, 0.65, 0.16, 1.0)
 _SUPPORT_RGBA = (0.10, 0.45, 0.30, 1.0)
+_LOOK_AHEAD = (0.08, 0.0, 0.0)  # [m] from the CoM: what the robot reaches for is before it
 _LEAST_DRAWN_FORCE = 0.2  # [N] a shorter arrow is all head
 _NO_GL = "no off-screen OpenGL (MUJOCO_GL={backend}): {reason}. On Debian: apt-get install {packages}"
 _PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
@@ -36,12 +40,12 @@ _PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Where the picture is taken from; the default is a three-quarter view that follows nothing."""
+    """Where the picture is taken from; by default from the right, where a lean shows, standing still."""
 
-    azimuth: float = 140.0  # [deg] about z; 90 looks along +y, 180 along -x
+    azimuth: float = 75.0  # [deg] about z; 90 looks along +y, 180 along -x
     elevation: float = -14.0  # [deg] negative: from above
     distance: float = 1.15  # [m] from lookat
-    lookat: tuple[float, float, float] | None = None  # [m] in world; None: halfway up the first picture's CoM
+    lookat: tuple[float, float, float] | None = None  # [m] in world; None: a little before the first picture's CoM
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +55,7 @@ class Picture:
     width: int = 800  # [px]
     height: int = 800  # [px]
     camera: Camera = Camera()
-    forces: bool = True  # contact forces, 8 mm a newton
+    forces: bool = True  # contact forces, 15 mm a newton
     balance: bool = True  # CoM, its projection, and the support polygon
 
 
@@ -62,7 +66,7 @@ def render_frames(footage: Footage, times: Sequence[float], picture: Picture = P
         WbmpcError: a time outside the run, or no OpenGL on this machine.
     """
     rows = [footage.index(time) for time in times]
-    model = footage.model
+    model = copy(footage.model)  # its off-screen buffer is about to grow; the run's own model stays as it is
     data = mujoco.MjData(model)
     camera = _aim(picture.camera, footage.com[rows[0]] if rows else np.zeros(3))
     frames = []
@@ -123,8 +127,7 @@ def _renderer(model: Any, picture: Picture) -> Iterator[Any]:
 def _aim(settings: Camera, com: NDArray[np.float64]) -> Any:
     camera = mujoco.MjvCamera()
     camera.azimuth, camera.elevation, camera.distance = settings.azimuth, settings.elevation, settings.distance
-    # A little above the CoM: head and feet are then about equally far from the edges.
-    camera.lookat[:] = settings.lookat if settings.lookat is not None else com + np.array([0.08, 0.0, 0.0])
+    camera.lookat[:] = settings.lookat if settings.lookat is not None else com + np.array(_LOOK_AHEAD)
     return camera
 
 
@@ -132,7 +135,7 @@ def _draw_forces(scene: Any, footage: Footage, row: int) -> None:
     for origin, force in zip(footage.contact_position[row], footage.contact_force[row], strict=True):
         if np.linalg.norm(force) > _LEAST_DRAWN_FORCE:
             tip = origin + _METRES_PER_NEWTON * force
-            _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, 0.004, origin, tip, _FORCE_RGBA)
+            _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, 0.005, origin, tip, _FORCE_RGBA)
 
 
 def _draw_balance(scene: Any, footage: Footage, row: int) -> None:
