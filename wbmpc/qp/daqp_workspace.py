@@ -15,8 +15,9 @@ from wbmpc.qp.solution import QpSolution, failed
 from wbmpc.signals import SolveStatus, Vector
 
 ITERATION_LIMIT = 2000
-PRIMAL_TOLERANCE = 1e-8  # violation of a row scaled to unit norm in the metric of H⁻¹
-SINGULARITY = (1e-9, 1e-7)  # pivots below mark dependent active rows; the second is tried when the first cycles
+# Pivots below sing_tol mark dependent active rows; primal_tol is the violation of a row scaled to unit norm in the
+# metric of H⁻¹. The second set is for problems on which the first makes daqp cycle.
+TOLERANCES = ({"sing_tol": 1e-9, "primal_tol": 1e-8}, {"sing_tol": 1e-7, "primal_tol": 1e-6})
 DUALITY_GAP = 1e-6  # relative; an honest optimum has about 1e-9
 _SOFT = 8  # bit of daqp's constraint sense
 _STATUS = {
@@ -113,19 +114,19 @@ def solve_cold(
     problems it activates more and writes past the end. So the model is set up on a trivial problem whose rows are all
     soft, which leaves room for every constraint, and the real data and flags follow as an update.
     """
-    for singularity in SINGULARITY:
-        model, x, status, iterations = _solve_fresh(data, sense, reciprocal, singularity)
+    for tolerances in TOLERANCES:
+        model, x, status, iterations = _solve_fresh(data, sense, reciprocal, tolerances)
         if status is not SolveStatus.NUMERICAL_ERROR:
             break
     return model, x, status, iterations
 
 
 def _solve_fresh(
-    data: QuadraticProgram | SlackForm, sense: NDArray[np.intc], reciprocal: Vector | None, singularity: float
+    data: QuadraticProgram | SlackForm, sense: NDArray[np.intc], reciprocal: Vector | None, tolerances: dict[str, float]
 ) -> tuple[daqp.Model, Vector, SolveStatus, int]:
     variables, rows = data.gradient.size, data.matrix.shape[0]
     model = daqp.Model()
-    model.settings = {"iter_limit": ITERATION_LIMIT, "primal_tol": PRIMAL_TOLERANCE, "sing_tol": singularity}
+    model.settings = {"iter_limit": ITERATION_LIMIT, **tolerances}
     roomy = sense.copy()
     roomy[variables:] |= _SOFT
     unit = np.ones(variables + rows)
