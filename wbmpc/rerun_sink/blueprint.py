@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 
 from wbmpc.rerun_sink.stream import TIMELINE
 
-_EYE_OFFSET = np.array([0.75, -0.95, 0.35])  # [m] from the robot: three-quarter view from its front right
+_EYE_OFFSET = np.array([-0.30, -1.05, 0.30])  # [m] from the robot: from its right, where a lean shows
+_LOOK_AHEAD = np.array([0.08, 0.0, -0.03])  # [m] what the robot reaches for is before it
+_BACKGROUND = (203, 214, 228)
 
 # Tab -> title of the plot -> entity whose curves it shows.
 _PLOTS = {
@@ -52,10 +54,10 @@ _LANES = {"Overview": _PHASES, "Contacts": _PHASES, "Solvers": ("Solver status",
 
 def layout(look_at: ArrayLike) -> Any:
     """The default blueprint; `look_at` (3,) [m] is the centre of the 3D view."""
-    look_target = np.asarray(look_at, dtype=float)
+    look_target = np.asarray(look_at, dtype=float) + _LOOK_AHEAD
     # time_ranges stay unset: a range of zero width hides whatever falls between two samples.
     eye = rrb.EyeControls3D(position=look_target + _EYE_OFFSET, look_target=look_target, eye_up=(0, 0, 1))
-    scene = rrb.Spatial3DView(origin="/world", name="Robot", eye_controls=eye, line_grid=False)
+    scene = rrb.Spatial3DView(origin="/world", name="Robot", eye_controls=eye, line_grid=False, background=_BACKGROUND)
     log = rrb.TextLogView(origin="/log", name="Events")
     tabs = rrb.Tabs(
         *(_curves(name, plots, _LANES.get(name)) for name, plots in _PLOTS.items()),
@@ -75,7 +77,11 @@ def layout(look_at: ArrayLike) -> Any:
 
 def _curves(name: str, plots: dict[str, str], lanes: tuple[str, str] | None) -> Any:
     """One tab: a plot above the other, and lanes of states at the bottom."""
-    views: list[Any] = [rrb.TimeSeriesView(origin=origin, name=title) for title, origin in plots.items()]
+    views: list[Any] = [
+        # With a legend for each of the joints there would be no room for their curves.
+        rrb.TimeSeriesView(origin=origin, name=title, plot_legend=rrb.PlotLegend(visible="/joints/" not in origin))
+        for title, origin in plots.items()
+    ]
     if lanes:
         views.append(rrb.StateTimelineView(origin=lanes[1], name=lanes[0]))
     return rrb.Vertical(*views, name=name)

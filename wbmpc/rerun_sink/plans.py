@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from wbmpc.footage import on_ground
 from wbmpc.rerun_sink.documents import candidate_lines, candidate_table
+from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.palette import AXES, FAULT, LEFT, LIMIT, PLANNED, RIGHT
 from wbmpc.rerun_sink.scene import Patch
 from wbmpc.rerun_sink.stream import Stream
@@ -33,6 +34,8 @@ def describe_plans(stream: Stream) -> None:
     for path, radius in {"/world/com/horizon": 0.003, "/world/zmp/horizon": 0.003}.items():
         stream.static(path, rr.LineStrips3D.from_fields(radii=radius, colors=[PLANNED]))
     stream.static("/world/support_polygon", rr.LineStrips3D.from_fields(radii=0.002, colors=[LIMIT]))
+    # Labels only on hover: a dozen of them would cover the robot.
+    stream.static("/world/candidates", rr.Points3D.from_fields(show_labels=False))
     stream.static("/world/zmp/delta_z", rr.Arrows3D.from_fields(radii=0.0015, colors=[FAULT]))
     for side, colour in zip(SIDES, (LEFT, RIGHT), strict=True):
         stream.static(f"/world/hands/{side}/horizon", rr.LineStrips3D.from_fields(radii=0.003, colors=[colour]))
@@ -114,21 +117,27 @@ def _write_candidates(stream: Stream, plans: Sequence[PlanReport], patches: Mapp
     if not plans:
         return
     time = np.array([plan.time for plan in plans])
-    tables = [candidate_table(plan) for plan in plans]
+    tables = [drawable(candidate_table(plan)) for plan in plans]
     columns = rr.TextDocument.columns(text=tables, media_type=["text/markdown"] * len(tables))
     stream.columns("/planner/candidates", time, columns)
     for plan in plans:
         lines = candidate_lines(plan.candidates)
         stream.texts("/log/candidates", np.full(len(lines), plan.time), lines)
-    shown = [[c for c in plan.candidates if c.patch in patches] for plan in plans]
+    shown = [_best_at_each_patch([c for c in plan.candidates if c.patch in patches]) for plan in plans]
     flat = [c for row in shown for c in row]
     marker: Any = rr.Points3D.columns(
         positions=[patches[c.patch].centre for c in flat],
         colors=[_marker_colour(c) for c in flat],
         radii=[0.012 if c.chosen else 0.008 for c in flat],
-        labels=[f"{c.patch}, {SIDES[c.hand]} hand: {c.reason}" for c in flat],
+        labels=[drawable(f"{c.patch}, {SIDES[c.hand]} hand: {c.reason}") for c in flat],
     )
     stream.columns("/world/candidates", time, marker.partition([len(row) for row in shown]))
+
+
+def _best_at_each_patch(candidates: Sequence[CandidateReport]) -> list[CandidateReport]:
+    """The hands share a patch and so would their markers: the better hand's is drawn."""
+    ranked = sorted(candidates, key=lambda c: (c.chosen, -c.cost))
+    return list({c.patch: c for c in ranked}.values())
 
 
 def _marker_colour(candidate: CandidateReport) -> tuple[int, int, int]:

@@ -11,6 +11,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.palette import LIMIT
 from wbmpc.rerun_sink.stream import Stream
 
@@ -77,21 +78,36 @@ class Scene:
     def _draw_patch(self, patch: Patch) -> None:
         outline = np.vstack([patch.corners, patch.corners[:1]]) + 1e-3 * patch.normal  # off the surface, or it flickers
         path = f"/world/patches/{_part(patch.name)}"
-        self._stream.static(path, rr.LineStrips3D([outline], colors=[LIMIT], radii=0.0015, labels=[patch.name]))
+        label = {"labels": [drawable(patch.name)], "show_labels": False}  # on hover: a dozen would hide the robot
+        self._stream.static(path, rr.LineStrips3D([outline], colors=[LIMIT], radii=0.0015, **label))
         normal = rr.Arrows3D(origins=[patch.centre], vectors=[0.03 * patch.normal], colors=[LIMIT], radii=0.0015)
         self._stream.static(f"{path}/normal", normal)
 
 
 def _part(name: str) -> str:
-    escaped: str = rr.escape_entity_path_part(name)
+    escaped: str = rr.escape_entity_path_part(drawable(name))
     return escaped
 
 
 def geom_rgba(model: Any, geom: int) -> NDArray[np.float64]:
-    """(4,) colour that MuJoCo draws: the geom's own when it has one, else its material's."""
+    """(4,) plain colour of a geom: its own when it has one, else its material's, times the texture's mean."""
     own, material = model.geom_rgba[geom], int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 and np.allclose(own, _DEFAULT_RGBA) else own
-    return np.asarray(rgba, dtype=float)
+    rgba = np.array(rgba, dtype=float)
+    if material >= 0:
+        rgba[:3] *= _mean_texture(model, material)
+    return rgba
+
+
+def _mean_texture(model: Any, material: int) -> NDArray[np.float64]:
+    """(3,) mean colour of a material's texture: the recording shows plain colours."""
+    texture = int(model.mat_texid[material, mujoco.mjtTextureRole.mjTEXROLE_RGB])
+    if texture < 0:
+        return np.ones(3)
+    start, channels = int(model.tex_adr[texture]), int(model.tex_nchannel[texture])
+    count = int(model.tex_width[texture]) * int(model.tex_height[texture])
+    texels = model.tex_data[start : start + count * channels].reshape(count, channels)
+    return np.resize(texels.mean(axis=0), 3) / 255  # one grey channel stands for all three
 
 
 def _shape(model: Any, geom: int) -> Any | None:

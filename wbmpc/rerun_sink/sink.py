@@ -16,6 +16,7 @@ from wbmpc.errors import WbmpcError
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink.blueprint import layout
 from wbmpc.rerun_sink.documents import verdict_document
+from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.plans import describe_plans, write_plans
 from wbmpc.rerun_sink.scene import Patch, Scene
 from wbmpc.rerun_sink.stream import Stream
@@ -70,14 +71,11 @@ class RerunSink:
         recording = rr.RecordingStream(APPLICATION)
         _open(recording, path, model)
         self._stream = Stream(recording)
-        recording.send_recording_name(f"{scenario_name}, seed {seed}")
-        recording.send_property("run", rr.AnyValues(scenario=scenario_name, seed=seed, sample_rate=rate))
-        if versions:
-            recording.send_property("versions", rr.AnyValues(**versions))
-        self._stream.static("/scenario", rr.TextDocument(f"```yaml\n{scenario_text}\n```", media_type="text/markdown"))
-        self._stream.static(
-            "/verdict", rr.TextDocument("No verdict yet: the run did not end.", media_type="text/plain")
-        )
+        recording.send_recording_name(drawable(f"{scenario_name}, seed {seed}"))
+        self._stream.properties("run", {"scenario": scenario_name, "seed": seed, "sample_rate": rate})
+        self._stream.properties("versions", versions or {})
+        self._stream.document("/scenario", f"~~~~yaml\n{scenario_text}\n~~~~")
+        self._stream.document("/verdict", "No verdict: the run did not end.")
         self._stream.static("/model", rr.AnyValues(mjb=_packed(model), mujoco=mujoco.__version__))
         self._scene = Scene(self._stream, model, patches)
         describe_ticks(self._stream, joint_names)
@@ -103,13 +101,11 @@ class RerunSink:
     def finish(self, verdict: Mapping[str, Any]) -> None:
         """Write what is left and the verdict (the content of NAME.json), as a text and as the file's properties."""
         self.flush()
-        document = rr.TextDocument(verdict_document(verdict), media_type="text/markdown")
-        self._stream.static("/verdict", document)
+        self._stream.document("/verdict", verdict_document(verdict))
         plain = {k: v for k, v in verdict.items() if isinstance(v, bool | int | float | str)}
         numbers = {k: float(v) for k, v in (verdict.get("metrics") or {}).items() if isinstance(v, int | float)}
-        self._stream.recording.send_property("verdict", rr.AnyValues(**plain))
-        if numbers:
-            self._stream.recording.send_property("metrics", rr.AnyValues(**numbers))
+        self._stream.properties("verdict", plain)
+        self._stream.properties("metrics", numbers)
 
     def close(self) -> None:
         """Write what is left and close the file; belongs in a `finally`. May be called twice."""

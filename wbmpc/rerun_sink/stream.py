@@ -5,13 +5,14 @@ A logging call a tick costs about 0.1 ms; a column of a hundred rows costs as mu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
+from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
 
 TIMELINE = "time"
@@ -29,6 +30,16 @@ class Stream:
         """What does not change over the run."""
         self.recording.log(path, *archetypes, static=True)
 
+    def document(self, path: str, markdown: str) -> None:
+        """A text that does not change over the run."""
+        self.static(path, rr.TextDocument(drawable(markdown), media_type="text/markdown"))
+
+    def properties(self, name: str, values: Mapping[str, bool | int | float | str]) -> None:
+        """Named values of the whole file: columns of a table over many files."""
+        shown = {key: drawable(value) if isinstance(value, str) else value for key, value in values.items()}
+        if shown:
+            self.recording.send_property(name, rr.AnyValues(**shown))
+
     def columns(self, path: str, time: NDArray[np.float64], columns: Any) -> None:
         """Any archetype's columns, one row for each `time` (n,) [s]."""
         if len(time):
@@ -44,7 +55,10 @@ class Stream:
 
     def series(self, path: str, names: Sequence[str], colours: Sequence[Colour], width: float = 1.5) -> None:
         """Names and colours of the curves of one entity."""
-        self.static(path, rr.SeriesLines(names=list(names), colors=list(colours), widths=[width] * len(names)))
+        self.static(
+            path,
+            rr.SeriesLines(names=[drawable(name) for name in names], colors=list(colours), widths=[width] * len(names)),
+        )
 
     def points(self, path: str, time: NDArray[np.float64], positions: NDArray[np.float64]) -> None:
         """Points (n, 3) or (n, k, 3) [m]; a point with a nan is not there at that time."""
@@ -75,11 +89,15 @@ class Stream:
         changes = [i for i, state in enumerate(states) if state != (states[i - 1] if i else last)]
         if states:
             self._last_state[path] = states[-1]
-        self.columns(path, np.asarray(time)[changes], rr.StateChange.columns(state=[states[i] for i in changes]))
+        self.columns(
+            path, np.asarray(time)[changes], rr.StateChange.columns(state=[drawable(states[i]) for i in changes])
+        )
 
     def texts(self, path: str, time: NDArray[np.float64], texts: Sequence[str], level: str = "INFO") -> None:
         """Lines of the text log."""
-        self.columns(path, time, rr.TextLog.columns(text=list(texts), level=[level] * len(texts)))
+        self.columns(
+            path, time, rr.TextLog.columns(text=[drawable(text) for text in texts], level=[level] * len(texts))
+        )
 
 
 def _present(positions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
