@@ -40,6 +40,7 @@ FREE_SHIFT = 1.0  # [m] bound on ΔZ when the need is asked for
 REACH_FLOOR = 0.12  # [m] smallest d: a hand never pins the CoM to itself
 RETRY_PLANS = 10  # plans between two firings of stage 3 when no candidate can help
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
+ALARM_TIME = 0.6  # [s] in which an alarm wears off
 NOT_RUN = StageReport(SolveStatus.NOT_RUN, 0.0, 0)
 
 
@@ -94,6 +95,7 @@ class Planner:
         ]
         self._heights = [t for t in tasks if isinstance(t, ComHeightTask)]
         self._goal = Posture(robot, nominal=q)
+        self._alarm = 0.0  # 0 … 1: how far the measured capture point is from the planned one
         self._candidates = Candidates(robot, patches, contact, nominal=q, backend=settings.miqp_backend)
         polygon = self._polygon()
         self._candidates.refresh(
@@ -147,6 +149,7 @@ class Planner:
                 posture=self._posture_target(),
             ),
             "velocity_time": self._period,
+            "urgency": 1.0 + self._alarm * (self._settings.whole_body.alarm_urgency - 1.0),
         }
         forces = np.zeros_like(self._forces)
         delta_z = np.zeros((self._preview.steps, 2))
@@ -207,7 +210,9 @@ class Planner:
         velocity_error = self._com_velocity - self._com[:, 1]
         omega = np.sqrt(GRAVITY / max(self._com[2, 0] - self._soles[:, 2].mean(), 0.05))
         capture_error = np.linalg.norm(position_error[:2] + velocity_error[:2] / omega)
-        share = settings.feedback if capture_error < settings.feedback_knee else settings.feedback_large
+        alarm = float(np.clip(capture_error / settings.feedback_knee - 1.0, 0.0, 1.0))
+        self._alarm = max(alarm, self._alarm - self._period / ALARM_TIME)
+        share = settings.feedback + alarm * (settings.feedback_large - settings.feedback)
         self._com[:2, 0] += share * position_error[:2]
         self._com[:2, 1] += share * velocity_error[:2]
         self._reference.advance(self._last.velocity, self._period)
@@ -265,7 +270,7 @@ class Planner:
         if not held:
             if not self._needed:
                 self._hopeless = 0.0
-            elif self._since_fired >= RETRY_PLANS and any(free) and self._hopeless < GIVE_UP_TIME:
+            elif self._since_fired >= RETRY_PLANS and any(free) and self._candidates.all and self._hopeless < GIVE_UP_TIME:
                 self._since_fired = 0
                 worst = int(np.argmax(np.abs(need.delta_z).max(axis=1)))
                 last = int(np.argmax(np.abs(need.delta_z[:, 1]))) if np.abs(need.delta_z[:, 1]).max() > 1e-3 else worst
@@ -304,9 +309,9 @@ class Planner:
                 for p, yaw in zip(self._soles, self._yaws, strict=True)
             ]
         )
-        return SupportPolygon.of_corners(
-            corners, margin=self._settings.whole_body.zmp_margin, plane_height=float(self._soles[:, 2].mean())
-        )
+        settings = self._settings.whole_body
+        margin = settings.zmp_margin + self._alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+        return SupportPolygon.of_corners(corners, margin=margin, plane_height=float(self._soles[:, 2].mean()))
 
     def _update_goal(self, polygon: SupportPolygon) -> None:
         """The posture at the reach's target, the bracing palm on its patch: what the reach needs of the CoM."""

@@ -38,6 +38,12 @@ class WholeBodySettings(StrictModel):
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
     zmp_margin: float = Field(0.018, ge=0, description="[m] inset of the support polygon")
+    zmp_margin_alarm: float = Field(
+        0.0, description="[m] the inset when the measured capture point is far off the plan: a push; negative: outside"
+    )
+    alarm_urgency: float = Field(
+        30.0, ge=1, description="factor on velocity_cost and position_cost when the capture point is far off the plan"
+    )
     zmp_margin_growth: float = Field(
         0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
     )
@@ -80,8 +86,8 @@ class PlannerSettings(StrictModel):
     qp_backend: str = Field("daqp", description="QP backend of stages 1 and 2: daqp, osqp or any name of qpsolvers")
     miqp_backend: str = Field("daqp", description="MIQP backend of stage 3: daqp or highs")
     feedback: float = Field(0.02, ge=0, le=1, description="share of the measured CoM error taken over at every plan")
-    feedback_large: float = Field(0.1, ge=0, le=1, description="the same for errors above feedback_knee")
-    feedback_knee: float = Field(0.01, gt=0, description="[m] capture-point error above which feedback_large rules")
+    feedback_large: float = Field(0.5, ge=0, le=1, description="the same for errors above 2 feedback_knee")
+    feedback_knee: float = Field(0.005, gt=0, description="[m] capture-point error from which the share grows")
     height: HeightSettings = HeightSettings()
     whole_body: WholeBodySettings = WholeBodySettings()
     contact: ContactSettings = ContactSettings()

@@ -83,9 +83,9 @@ class WholeBodyStage:
         soft[self._reach_rows] = settings.reach_slack_cost
         self.problem = QuadraticProgram(4 * n + nv, rows, soft_weight=soft)
         self._u, self._dz, self._qd = slice(0, 2 * n), slice(2 * n, 4 * n), slice(4 * n, 4 * n + nv)
-        self._horizon_hessian = (
-            settings.jerk_cost * np.eye(n)
-            + settings.velocity_cost * preview.P_vu.T @ preview.P_vu
+        self._jerk_hessian = settings.jerk_cost * np.eye(n)
+        self._return_hessian = (
+            settings.velocity_cost * preview.P_vu.T @ preview.P_vu
             + settings.position_cost * preview.P_pu.T @ preview.P_pu
         )
         self.problem.hessian[self._dz, self._dz] = settings.delta_z_cost * np.eye(2 * n)
@@ -108,6 +108,7 @@ class WholeBodyStage:
         delta_z_limit: float,
         tasks: VelocityTasks,
         velocity_time: float,
+        urgency: float,
     ) -> tuple[HorizontalPlan | None, QpSolution]:
         """Plan from the horizontal CoM state (2, 3): rows x, y; columns c, ċ, c̈ [m, m/s, m/s²].
 
@@ -119,6 +120,7 @@ class WholeBodyStage:
             reach_distance: (2, 2) d per hand and axis [m].
             delta_z_limit: bound on |ΔZ| per axis [m]: large to ask whether a contact is needed, 0 to execute.
             tasks: see `VelocityTasks`.
+            urgency: factor ≥ 1 on the costs of CoM velocity and position: how fast to come to rest.
             velocity_time: when the CoM velocity that q̇ should meet is taken [s after the state], < T.
 
         Returns:
@@ -151,15 +153,16 @@ class WholeBodyStage:
         )
         for axis in range(2):
             block = slice(axis * n, (axis + 1) * n)
-            qp.hessian[block, block] = self._horizon_hessian
+            qp.hessian[block, block] = self._jerk_hessian + urgency * self._return_hessian
             first = axis * n
             qp.hessian[first, first] += w_com * gain**2
             cross = -w_com * gain * J[axis]  # (nv,)
             qp.hessian[first, self._qd] = cross
             qp.hessian[self._qd, first] = cross
-            qp.gradient[block] = settings.velocity_cost * (
-                preview.P_vu.T @ free_velocity[axis]
-            ) + settings.position_cost * (preview.P_pu.T @ (free[axis] - com_reference[:, axis]))
+            qp.gradient[block] = urgency * (
+                settings.velocity_cost * (preview.P_vu.T @ free_velocity[axis])
+                + settings.position_cost * (preview.P_pu.T @ (free[axis] - com_reference[:, axis]))
+            )
             qp.gradient[first] += w_com * gain * wanted[axis]
 
         # ZMP rows: edge-major within a knot

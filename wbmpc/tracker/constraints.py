@@ -8,6 +8,7 @@ from wbmpc.robot import Robot
 from wbmpc.signals import Vector
 
 WRENCH_ROWS = 10
+PRESSURE_ROWS = 4
 PALM_ROWS = 4
 
 
@@ -27,6 +28,12 @@ def sole_wrench_rows(*, half_extents: Vector, friction: float, yaw_radius: float
         rows.append([0, 0, -length, 0, sign, 0])  # m_y = -x_cop f_z
         rows.append([0, 0, -friction * yaw_radius, 0, 0, sign])
     return np.array(rows, dtype=float)
+
+
+def pressure_rows(half_extents: Vector) -> Vector:
+    """Rows (4, 6) of P w ≤ 0: the centre of pressure of a sole's wrench lies within ± half_extents (2,) [m]."""
+    length, width = half_extents
+    return np.array([[0, 0, -reach, *(sign * np.eye(3)[axis])] for axis, reach in ((0, width), (1, length)) for sign in (1, -1)])
 
 
 def palm_force_rows(friction: float) -> Vector:

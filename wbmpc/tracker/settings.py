@@ -16,8 +16,8 @@ class TrackerSettings(StrictModel):
 
     qp_backend: str = Field("daqp", description="QP backend: daqp, osqp or any name of qpsolvers")
 
-    com_stiffness: float = Field(40.0, ge=0, description="[1/s²]")
-    com_damping: float = Field(12.0, ge=0, description="[1/s]")
+    com_stiffness: float = Field(60.0, ge=0, description="[1/s²]")
+    com_damping: float = Field(18.0, ge=0, description="[1/s]")
     com_integral: float = Field(20.0, ge=0, description="[1/s³] removes what an unmodelled load leaves of the height")
     com_integral_limit: float = Field(2.0, ge=0, description="[m/s²] bound on the integral's share")
     com_weight: float = Field(200.0, gt=0, description="horizontal")
@@ -26,7 +26,7 @@ class TrackerSettings(StrictModel):
     momentum_weight: float = Field(20.0, ge=0, description="[cost / (N·m)²]")
     torso_stiffness: float = Field(60.0, ge=0, description="[1/s²]")
     torso_damping: float = Field(12.0, ge=0, description="[1/s]")
-    torso_weight: float = Field(0.5, ge=0)
+    torso_weight: float = Field(0.1, ge=0)
     stance_damping: float = Field(30.0, ge=0, description="[1/s] of a stance foot's and a braced palm's velocity")
     stance_weight: float = Field(1000.0, gt=0)
     swing_stiffness: float = Field(250.0, ge=0, description="[1/s²]")
@@ -48,7 +48,11 @@ class TrackerSettings(StrictModel):
 
     foot_friction: float = Field(0.35, gt=0, description="friction coefficient that the soles count on")
     foot_yaw_radius: float = Field(0.02, gt=0, description="[m] yaw moment / (friction · normal force) of a sole")
-    foot_inset: float = Field(0.01, ge=0, description="[m] inset of the sole's rectangle for its centre of pressure")
+    foot_inset: float = Field(0.002, ge=0, description="[m] inset of the sole's rectangle for its centre of pressure")
+    foot_comfort_inset: float = Field(
+        0.01, ge=0, description="[m] inset within which the centre of pressure stays unless it must save the balance"
+    )
+    foot_comfort_weight: float = Field(300.0, gt=0, description="[cost / (N·m)²] price of leaving the comfort inset")
     joint_velocity_limit: float = Field(5.0, gt=0, description="[rad/s]")
     limit_horizon: float = Field(0.025, gt=0, description="[s] within which a joint may stop before its limit")
     torque_share: float = Field(0.95, gt=0, le=1, description="share of the servo's torque that may be planned")

@@ -13,9 +13,11 @@ from wbmpc.rotations import contact_frame
 from wbmpc.signals import HandMode, RobotState, Setpoint, SolveStatus, TorqueCommand, Vector
 from wbmpc.tracker.constraints import (
     PALM_ROWS,
+    PRESSURE_ROWS,
     WRENCH_ROWS,
     JointLimits,
     palm_force_rows,
+    pressure_rows,
     sole_wrench_rows,
 )
 from wbmpc.tracker.settings import TrackerSettings
@@ -54,9 +56,11 @@ class Tracker:
         )
         self._torque_rows = slice(0, nj)
         self._palm_rows = slice(nj + 2 * WRENCH_ROWS, nj + 2 * WRENCH_ROWS + 2 * PALM_ROWS)
-        rows = self._palm_rows.stop
+        comfort_rows = slice(self._palm_rows.stop, self._palm_rows.stop + 2 * PRESSURE_ROWS)
+        rows = comfort_rows.stop
         soft = np.zeros(rows)
         soft[self._torque_rows] = TORQUE_SLACK_COST
+        soft[comfort_rows] = settings.foot_comfort_weight
         self.problem = QuadraticProgram(nj + FORCES, rows, soft_weight=soft)
         self.problem.upper[nj:] = 0.0
         wrench_rows = sole_wrench_rows(
@@ -66,7 +70,12 @@ class Tracker:
         )
         for side in range(2):
             first = nj + side * WRENCH_ROWS
-            self.problem.matrix[first : first + WRENCH_ROWS, nj + 6 * side : nj + 6 * side + 6] = wrench_rows
+            wrench = slice(nj + 6 * side, nj + 6 * side + 6)
+            self.problem.matrix[first : first + WRENCH_ROWS, wrench] = wrench_rows
+            first = comfort_rows.start + side * PRESSURE_ROWS
+            self.problem.matrix[first : first + PRESSURE_ROWS, wrench] = pressure_rows(
+                robot.sole_half_extents - settings.foot_comfort_inset
+            )
         self._workspace = make_workspace(settings.qp_backend, self.problem)
         self._contact_jacobian = np.zeros((FORCES, robot.nv))
         self._contact_rotation = np.zeros((4, 3, 3))  # soles, then palms: contact frame to world
