@@ -9,6 +9,8 @@ import numpy as np
 
 from wbmpc.signals import SIDES, CandidateReport, PlanReport
 
+_NOTHING = "–"  # stands for a number that does not exist
+
 
 def candidate_lines(candidates: Sequence[CandidateReport]) -> list[str]:
     """One log line for each candidate: what it would cost, and why it won or lost."""
