@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbmpc.robot import Robot
+from wbmpc.rotations import cross
 from wbmpc.signals import GRAVITY, Measurement, RobotState, Vector
 
 _ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -69,12 +70,12 @@ class Estimator:
             twist = pin.getFrameVelocity(robot.pin_model, data, frame, _ALIGNED)
             pressure = R.T @ np.array([-force[side, 4] / load, force[side, 3] / load, 0.0])
             point = sole + pressure
-            moving = twist.linear + np.cross(twist.angular, pressure) + np.cross(omega, point)
+            moving = twist.linear + cross(twist.angular, pressure) + cross(omega, point)
             velocity -= load * (R @ moving)
             position += load * (self._anchor[side] - R @ sole)
             weight_sum += load
 
-        lever = R @ (np.cross(omega, imu.translation) + imu_twist.linear)  # IMU's velocity relative to the base's origin
+        lever = R @ (cross(omega, imu.translation) + imu_twist.linear)  # IMU's velocity relative to the base's origin
         self._imu_velocity += step * (world_imu @ measurement.imu_accelerometer - np.array([0.0, 0.0, GRAVITY]))
         if weight_sum > 0.0:
             self._imu_velocity += self.VELOCITY_GAIN * (velocity / weight_sum + lever - self._imu_velocity)

@@ -94,9 +94,9 @@ class Plant:
         m, d, robot = self.model, self.data, self._robot
         time, qpos, qvel = float(d.time), d.qpos.copy(), d.qvel.copy()
         speed = qvel[6:] / robot.joint_speed
-        upper = robot.torque_limit * np.clip(1.0 - speed, 0.0, 1.0)
-        lower = -robot.torque_limit * np.clip(1.0 + speed, 0.0, 1.0)
-        applied = np.clip(torque, lower, upper)
+        upper = robot.torque_limit * np.minimum(np.maximum(1.0 - speed, 0.0), 1.0)
+        lower = robot.torque_limit * np.maximum(np.minimum(-1.0 - speed, 0.0), -1.0)
+        applied = np.minimum(np.maximum(torque, lower), upper)
         d.ctrl[:] = applied
         external = self._push(time)
         mujoco.mj_subtreeVel(m, d)

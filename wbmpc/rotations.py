@@ -7,6 +7,13 @@ import numpy as np
 from wbmpc.signals import Vector
 
 
+def cross(a: Vector, b: Vector) -> Vector:
+    """a × b for vectors (3,); several times faster than numpy's general one, which the 1 kHz loop would feel."""
+    a0, a1, a2 = a.tolist()
+    b0, b1, b2 = b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
 def rotation_error(*, desired: Vector, measured: Vector) -> Vector:
     """Rotation vector (3,) in world that turns `measured` (3, 3) into `desired` (3, 3) [rad], |error| ≤ π."""
     R = desired @ measured.T
@@ -21,9 +28,9 @@ def rotation_error(*, desired: Vector, measured: Vector) -> Vector:
 def contact_frame(normal: Vector) -> Vector:
     """Rotation (3, 3) whose columns are two tangents and the unit `normal` (3,), in world."""
     helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.7 else np.array([0.0, 1.0, 0.0])
-    second = np.cross(normal, helper)
+    second = cross(normal, helper)
     second /= np.linalg.norm(second)
-    return np.column_stack([np.cross(second, normal), second, normal])
+    return np.column_stack([cross(second, normal), second, normal])
 
 
 def level_frame(yaw: float) -> Vector:

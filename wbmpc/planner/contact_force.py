@@ -35,32 +35,46 @@ class Need:
         )
 
 
-def shift_rows(need: Need, knot: int, point: Vector) -> tuple[Vector, Vector]:
-    """Rows G (2, 3) and right-hand side h (2,) [N m] of G f = h: the force f that gives the wanted ΔZ at one knot.
+def shift_rows(need: Need, point: Vector) -> Vector:
+    """Rows G (n, 2, 3) of G f = h: the force f that gives the wanted ΔZ at each knot; h is `shift_bound`.
 
     p_z f_xy + (Z_nc − p_xy + ΔZ) f_z = m (g + c̈_z) ΔZ − phantom   ([M] eq. neweq multiplied by p_z, so that
-    contacts near the foot plane are no singularity). `point` is p in world [m].
+    contacts near the foot plane are no singularity). `point` is p (3,) in world [m].
     """
-    lever = point[2] - need.polygons[knot].plane_height
-    G = np.zeros((2, 3))
-    G[0, 0] = G[1, 1] = lever
-    G[:, 2] = need.zmp[knot] - point[:2] + need.delta_z[knot]
-    return G, need.weight[knot] * need.delta_z[knot] - need.phantom[knot]
+    G = np.zeros((len(need.zmp), 2, 3))
+    G[:, 0, 0] = G[:, 1, 1] = [point[2] - polygon.plane_height for polygon in need.polygons]
+    G[:, :, 2] = need.zmp - point[:2] + need.delta_z
+    return G
 
 
-def polygon_rows(need: Need, knot: int, point: Vector) -> tuple[Vector, Vector]:
-    """Rows P (MAX_EDGES, 3) and bound q (MAX_EDGES,) [N m] of P f ≤ q: the feet's ZMP stays in its polygon under f.
+def shift_bound(need: Need) -> Vector:
+    """Right-hand side h (n, 2) [N m] of `shift_rows`."""
+    return need.weight[:, None] * need.delta_z - need.phantom
+
+
+def polygon_rows(need: Need, point: Vector) -> Vector:
+    """Rows P (n, MAX_EDGES, 3) of P f ≤ q: the feet's ZMP stays in its polygon under f; q is `polygon_bound`.
 
     A ((m (g + c̈_z)) Z_nc + p_z f_xy − p_xy f_z) ≤ b (m (g + c̈_z) − f_z): the exact ZMP times its denominator,
-    which is linear in f because Z_nc belongs to the plan.
+    which is linear in f because Z_nc belongs to the plan. `point` is p (3,) in world [m].
     """
-    polygon = need.polygons[knot]
-    lever = point[2] - polygon.plane_height
-    A, b = polygon.normals, np.where(np.isfinite(polygon.offsets), polygon.offsets, 1e3)
-    P = np.empty((MAX_EDGES, 3))
-    P[:, :2] = lever * A
-    P[:, 2] = b - A @ point[:2]
-    return P, need.weight[knot] * (b - A @ need.zmp[knot])
+    A, b = _half_planes(need)
+    P = np.empty((*b.shape, 3))
+    P[:, :, :2] = A * np.array([point[2] - polygon.plane_height for polygon in need.polygons])[:, None, None]
+    P[:, :, 2] = b - A @ point[:2]
+    return P
+
+
+def polygon_bound(need: Need) -> Vector:
+    """Right-hand side q (n, MAX_EDGES) [N m] of `polygon_rows`."""
+    A, b = _half_planes(need)
+    return need.weight[:, None] * (b - np.einsum("kei,ki->ke", A, need.zmp))
+
+
+def _half_planes(need: Need) -> tuple[Vector, Vector]:
+    """Normals (n, MAX_EDGES, 2) and offsets (n, MAX_EDGES) [m]; a padded row says f_z ≤ the feet's weight, roughly."""
+    offsets = np.array([polygon.offsets for polygon in need.polygons])
+    return np.array([polygon.normals for polygon in need.polygons]), np.where(np.isfinite(offsets), offsets, 1e3)
 
 
 def cone_rows(patch: PatchPose) -> Vector:
@@ -127,6 +141,12 @@ class ContactChoice:
         qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
         # a small curvature everywhere: solvers want strict convexity, unused slots and binaries have no cost of their own
         qp.hessian[:] = 1e-6 * np.eye(forces + slots)
+        h, q = shift_bound(need), polygon_bound(need)
+        for knot in range(self.KNOTS):
+            first = knot * self._knot_rows
+            qp.lower[first : first + 2] = qp.upper[first : first + 2] = h[knot]
+            qp.lower[first + 2 : first + self._knot_rows] = -np.inf
+            qp.upper[first + 2 : first + self._knot_rows] = q[knot]
         row = self.KNOTS * self._knot_rows
         for i in range(slots):
             block = slice(3 * self.KNOTS * i, 3 * self.KNOTS * (i + 1))
@@ -140,17 +160,13 @@ class ContactChoice:
             qp.gradient[forces + i] = weights[i]
             cone = cone_rows(patch)
             price = force_price(patch, self._settings, self._mass)
+            G, P = shift_rows(need, patch.position), polygon_rows(need, patch.position)
             for knot in range(self.KNOTS):
                 columns = slice(3 * (self.KNOTS * i + knot), 3 * (self.KNOTS * i + knot) + 3)
                 first = knot * self._knot_rows
                 qp.hessian[columns, columns] = price
-                G, h = shift_rows(need, knot, patch.position)
-                qp.matrix[first : first + 2, columns] = G
-                qp.lower[first : first + 2] = qp.upper[first : first + 2] = h
-                P, q = polygon_rows(need, knot, patch.position)
-                qp.matrix[first + 2 : first + self._knot_rows, columns] = P
-                qp.lower[first + 2 : first + self._knot_rows] = -np.inf
-                qp.upper[first + 2 : first + self._knot_rows] = q
+                qp.matrix[first : first + 2, columns] = G[knot]
+                qp.matrix[first + 2 : first + self._knot_rows, columns] = P[knot]
                 qp.matrix[row : row + 4, columns] = cone
                 qp.matrix[row + 4, columns] = patch.normal
                 qp.matrix[row + 4, forces + i] = -patch.force_cap
@@ -192,6 +208,7 @@ class ContactForce:
         self.problem.x_lower[:], self.problem.x_upper[:] = -np.inf, np.inf
         self.problem.matrix[:] = 0.0
         self._width = width
+        self._knots = np.arange(steps)
         self._workspace = make_workspace(backend, self.problem)
 
     def solve(self, need: Need, patches: list[PatchPose | None], caps: Vector) -> tuple[Vector | None, QpSolution]:
@@ -201,37 +218,33 @@ class ContactForce:
             patches: one per contact slot; None for an unused slot.
             caps: (contacts, steps) bound on each normal force at each knot [N]; 0 where the contact is not there yet.
         """
-        qp = self.problem
-        for k in range(self._steps):
-            first = k * self._rows_per_knot
-            cone_row = first + 2 + MAX_EDGES
-            for slot, patch in enumerate(patches):
-                columns = slice(k * self._width + 3 * slot, k * self._width + 3 * slot + 3)
-                cap = caps[slot, k]
-                if patch is None or cap <= 0.0:
-                    qp.x_lower[columns] = qp.x_upper[columns] = 0.0
-                    qp.matrix[first : first + self._rows_per_knot, columns] = 0.0
-                    qp.lower[cone_row : cone_row + 5] = -np.inf
-                    qp.upper[cone_row : cone_row + 5] = np.inf
-                else:
-                    qp.x_lower[columns], qp.x_upper[columns] = -np.inf, np.inf
-                    qp.hessian[columns, columns] = force_price(patch, self._settings, self._mass)
-                    qp.matrix[first : first + 2, columns], _ = shift_rows(need, k, patch.position)
-                    qp.matrix[first + 2 : first + 2 + MAX_EDGES, columns], _ = polygon_rows(need, k, patch.position)
-                    qp.matrix[cone_row : cone_row + 4, columns] = cone_rows(patch)
-                    qp.matrix[cone_row + 4, columns] = patch.normal
-                    qp.lower[cone_row : cone_row + 5] = -np.inf
-                    qp.upper[cone_row : cone_row + 4] = 0.0
-                    qp.upper[cone_row + 4] = cap
-                cone_row += 5
-            anywhere = np.zeros(3)
-            _, h = shift_rows(need, k, anywhere)
-            _, q = polygon_rows(need, k, anywhere)
-            used = any(p is not None and caps[s, k] > 0.0 for s, p in enumerate(patches))
-            qp.lower[first : first + 2] = h if used else -np.inf
-            qp.upper[first : first + 2] = h if used else np.inf
-            qp.lower[first + 2 : first + 2 + MAX_EDGES] = -np.inf
-            qp.upper[first + 2 : first + 2 + MAX_EDGES] = q if used else np.inf
+        qp, n, width = self.problem, self._steps, self._width
+        rows = qp.matrix.reshape(n, self._rows_per_knot, n, width)[self._knots, :, self._knots]  # diagonal blocks, a copy
+        lower, upper = qp.lower.reshape(n, -1), qp.upper.reshape(n, -1)
+        x_lower, x_upper = qp.x_lower.reshape(n, width), qp.x_upper.reshape(n, width)
+        rows[:] = 0.0
+        shift, polygon = slice(0, 2), slice(2, 2 + MAX_EDGES)
+        h, q = shift_bound(need), polygon_bound(need)
+        used = (caps > 0.0).any(axis=0)[:, None]
+        lower[:, shift], upper[:, shift] = np.where(used, h, -np.inf), np.where(used, h, np.inf)
+        upper[:, polygon] = np.where(used, q, np.inf)
+        for slot, patch in enumerate(patches):
+            columns = slice(3 * slot, 3 * slot + 3)
+            cone = slice(2 + MAX_EDGES + 5 * slot, 7 + MAX_EDGES + 5 * slot)
+            free = (caps[slot] > 0.0)[:, None] if patch is not None else np.zeros((n, 1), dtype=bool)
+            x_lower[:, columns], x_upper[:, columns] = np.where(free, -np.inf, 0.0), np.where(free, np.inf, 0.0)
+            if patch is None or not free.any():
+                continue
+            rows[:, shift, columns] = shift_rows(need, patch.position)
+            rows[:, polygon, columns] = polygon_rows(need, patch.position)
+            rows[:, cone, columns] = np.vstack([cone_rows(patch), patch.normal])
+            upper[:, cone] = 0.0
+            upper[:, cone.stop - 1] = caps[slot]
+            price = force_price(patch, self._settings, self._mass)
+            for k in range(n):
+                first = k * width + 3 * slot
+                qp.hessian[first : first + 3, first : first + 3] = price
+        qp.matrix.reshape(n, self._rows_per_knot, n, width)[self._knots, :, self._knots] = rows
         solution = self._workspace.solve()
         if solution.status != SolveStatus.SOLVED:
             return None, solution

@@ -55,4 +55,12 @@ class HandPath:
 
     def positions(self, sigmas: Vector) -> Vector:
         """Positions (n, 3) [m] at `sigmas` (n,)."""
-        return np.array([self.at(float(s))[0] for s in sigmas])
+        way = self.end - self.start
+        along = float(way @ self.away)
+        outward = along * self.away
+        first, second = (LEAD, LAG) if along >= 0.0 else (LAG, LEAD)
+        p = np.tile(self.start, (len(sigmas), 1))
+        for part, (begin, finish) in ((outward, first), (way - outward, second)):
+            phase = np.minimum(np.maximum((sigmas - begin) / (finish - begin), 0.0), 1.0)
+            p += (phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2))[:, None] * part
+        return p

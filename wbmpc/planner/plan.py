@@ -80,8 +80,8 @@ class Plan:
             hand_velocity=self.hand_velocity + dt * self.hand_acceleration,
             hand_acceleration=self.hand_acceleration,
             hand_force=self.hand_force,
-            hand_force_cap=np.clip(
-                self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0, self.hand_force_cap_top
+            hand_force_cap=np.minimum(
+                np.maximum(self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0), self.hand_force_cap_top
             ),
             hand_normal=self.hand_normal,
             hand_friction=self.hand_friction,

@@ -101,7 +101,7 @@ class Planner:
         self._candidates.refresh(
             soles=self._soles, yaws=self._yaws, centre=polygon.centre, iterations=40, everyone=True
         )
-        for _ in range(40):
+        for _ in range(80):
             self._update_goal(polygon)
         self._shrink = 0.0  # [m] taken off d while a held hand stays short of its target
         self._needed, self._quiet = False, True
@@ -122,7 +122,7 @@ class Planner:
         polygons = tuple(polygon.shrunk(growth * t) for t in self._preview.times)
         self._advance(state, events)
         self._update_goal(polygon)
-        self._candidates.refresh(soles=self._soles, yaws=self._yaws, centre=polygon.centre, iterations=2)
+        self._candidates.refresh(soles=self._soles, yaws=self._yaws, centre=polygon.centre, iterations=1)
         times = self._preview.times
         mass = state.mass_scale * self._robot.mass
 
@@ -320,7 +320,7 @@ class Planner:
             if reach.phase != ReachPhase.DONE:
                 palms[reach.side] = reach.target
         if any(p is not None for p in palms):
-            self._goal.iterate(2, soles=self._soles, yaws=self._yaws, palms=palms, centre=polygon.centre)
+            self._goal.iterate(1, soles=self._soles, yaws=self._yaws, palms=palms, centre=polygon.centre)
 
     def _hand_references(self, time: float, *, full_pace: bool) -> tuple[Vector, Vector]:
         """Palm references (2, N, 3) over the horizon, nan for a free hand, and the reach's σ (N,)."""

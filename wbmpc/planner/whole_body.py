@@ -94,6 +94,7 @@ class WholeBodyStage:
             for hand in range(2):
                 first = self._reach_rows.start + (2 * hand + axis) * n
                 self.problem.matrix[first : first + n, block] = preview.P_pu
+        self._knots = np.arange(n)
         self._workspace = make_workspace(backend, self.problem)
 
     def solve(
@@ -167,15 +168,13 @@ class WholeBodyStage:
 
         # ZMP rows: edge-major within a knot
         rows = qp.matrix[self._zmp_rows].reshape(n, MAX_EDGES, -1)
-        for k, polygon in enumerate(polygons):
-            A = polygon.normals  # (edges, 2)
-            rows[k, :, : k + 1] = A[:, :1] * P_zu[k, : k + 1]
-            rows[k, :, n : n + k + 1] = A[:, 1:] * P_zu[k, : k + 1]
-            rows[k, :, 2 * n + k] = A[:, 0]
-            rows[k, :, 3 * n + k] = A[:, 1]
-            base = k * MAX_EDGES
-            qp.upper[base : base + MAX_EDGES] = polygon.offsets - A @ free_zmp[k]
-        qp.lower[self._zmp_rows] = -np.inf
+        A = np.array([polygon.normals for polygon in polygons])  # (N, edges, 2)
+        offsets = np.array([polygon.offsets for polygon in polygons])
+        np.multiply(A[:, :, :1], P_zu[:, None, :], out=rows[:, :, :n])
+        np.multiply(A[:, :, 1:], P_zu[:, None, :], out=rows[:, :, n : 2 * n])
+        rows[self._knots, :, 2 * n + self._knots] = A[:, :, 0]
+        rows[self._knots, :, 3 * n + self._knots] = A[:, :, 1]
+        qp.upper[self._zmp_rows] = (offsets - np.einsum("kei,ki->ke", A, free_zmp)).ravel()
 
         # reach rows: |R - C| <= d
         for hand in range(2):

@@ -10,6 +10,7 @@ from wbmpc.signals import Vector
 WRENCH_ROWS = 10
 PRESSURE_ROWS = 4
 PALM_ROWS = 4
+LARGE = 2000.0  # [rad/s²] no joint accelerates faster
 
 
 def sole_wrench_rows(*, half_extents: Vector, friction: float, yaw_radius: float) -> Vector:
@@ -63,15 +64,16 @@ class JointLimits:
         ahead = position + h * velocity
         lower = np.maximum((-self._speed - velocity) / h, 2.0 * (self._lower - ahead) / h**2)
         upper = np.minimum((self._speed - velocity) / h, 2.0 * (self._upper - ahead) / h**2)
-        np.clip(lower, -2000.0, 2000.0, out=lower)
-        np.clip(upper, -2000.0, 2000.0, out=upper)
-        middle = 0.5 * (lower + upper)
+        np.minimum(np.maximum(lower, -LARGE, out=lower), LARGE, out=lower)
+        np.minimum(np.maximum(upper, -LARGE, out=upper), LARGE, out=upper)
         crossed = lower > upper
-        lower[crossed] = upper[crossed] = middle[crossed]
+        if crossed.any():
+            lower[crossed] = upper[crossed] = 0.5 * (lower + upper)[crossed]
         return lower, upper
 
     def torque(self, velocity: Vector) -> tuple[Vector, Vector]:
         """Lower and upper bound (nj,) on τ [N·m]: stall torque, falling to zero at the no-load speed."""
-        upper = self._stall * np.clip(1.0 - velocity / self._no_load, 0.0, 1.0)
-        lower = -self._stall * np.clip(1.0 + velocity / self._no_load, 0.0, 1.0)
+        share = velocity / self._no_load
+        upper = self._stall * np.minimum(np.maximum(1.0 - share, 0.0), 1.0)
+        lower = self._stall * np.maximum(np.minimum(-1.0 - share, 0.0), -1.0)
         return lower, upper

@@ -53,7 +53,7 @@ class TaskStack:
         error = setpoint.com_position - kinematics.com
         self._com_integral[2] += self._step * error[2]
         bound = s.com_integral_limit / max(s.com_integral, 1e-9)
-        np.clip(self._com_integral, -bound, bound, out=self._com_integral)
+        self._com_integral[2] = min(max(self._com_integral[2], -bound), bound)
         self.matrix[COM] = kinematics.com_jacobian
         self.target[COM] = (
             setpoint.com_acceleration

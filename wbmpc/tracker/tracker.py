@@ -84,6 +84,8 @@ class Tracker:
         self._reference = np.zeros(nj + FORCES)
         self._stacked = np.zeros((self._tasks.matrix.shape[0], nj + FORCES))
         self._torque = np.zeros(nj)
+        self._torque_offset = np.zeros(nj)
+        self._torque_bounds = self._limits.torque(np.zeros(nj))
 
     def solve(self, state: RobotState, setpoint: Setpoint) -> TorqueCommand:
         """Torques for one tick. Never raises for a failed solve: see the class."""
@@ -92,13 +94,13 @@ class Tracker:
         kinematics.update(state.q, state.v)
         self._tasks.build(kinematics, state.v, setpoint)
         self._contacts(kinematics, setpoint)
+        self._torque_bounds = lower, upper = self._limits.torque(state.v[6:])
         base_offset = self._assemble(state, setpoint)
         solution = self._workspace.solve()
         if solution.status != SolveStatus.SOLVED:
             torque = self._torque - self._settings.fallback_damping * state.v[6:]
-            lower, upper = self._limits.torque(state.v[6:])
             return TorqueCommand(
-                torque=np.clip(torque, lower, upper),
+                torque=np.minimum(np.maximum(torque, lower), upper),
                 acceleration=np.zeros(self._robot.nv),
                 sole_wrench_in_world=np.zeros((2, 6)),
                 palm_force_in_world=np.zeros((2, 3)),
@@ -113,8 +115,7 @@ class Tracker:
         qp, rows = self.problem, self._torque_rows
         # rows hold torque − offset; the bounds were shifted by the same offset
         torque = qp.matrix[rows] @ y + self._torque_offset
-        lower, upper = self._limits.torque(state.v[6:])
-        np.clip(torque, lower, upper, out=torque)
+        np.minimum(np.maximum(torque, lower, out=torque), upper, out=torque)
         self._torque = torque
         forces = y[nj:].reshape(6, 3)
         wrench = np.empty((2, 6))
@@ -206,7 +207,7 @@ class Tracker:
         robot = self._robot
         self._torque_offset = h[6:] + M[6:, :6] @ base_offset + robot.damping * velocity
         self._torque_offset += robot.frictionloss * np.tanh(setpoint.joint_velocity / FRICTION_SPEED)
-        lower, upper = self._limits.torque(velocity)
+        lower, upper = self._torque_bounds
         np.subtract(lower, self._torque_offset, out=qp.lower[self._torque_rows])
         np.subtract(upper, self._torque_offset, out=qp.upper[self._torque_rows])
         qp.x_lower[:nj], qp.x_upper[:nj] = self._limits.acceleration(position, velocity)
