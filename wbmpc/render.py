@@ -6,26 +6,54 @@ the variable. Without it MuJoCo would look for a screen.
 
 from __future__ import annotations
 
+import ctypes
 import os
-from ctypes.util import find_library
-
-# EGL unless only OSMesa is installed. Without either, EGL's failure is the one that is reported.
-os.environ.setdefault("MUJOCO_GL", "osmesa" if find_library("OSMesa") and not find_library("EGL") else "egl")
-
+import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
+from ctypes.util import find_library
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from wbmpc.errors import WbmpcError
 from wbmpc.footage import Footage
+
+_NO_GL = "no off-screen OpenGL (MUJOCO_GL={backend}): {reason}. On Debian: apt-get install {packages}"
+_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
+
+
+def _backend() -> str:
+    """The first off-screen OpenGL that can be loaded; with one that cannot, `import mujoco` itself would fail."""
+    for backend, library in (("egl", "EGL"), ("osmesa", "OSMesa")):
+        if name := find_library(library):
+            try:
+                ctypes.CDLL(name)
+            except OSError:
+                continue
+            return backend
+    return "disable"
+
+
+def _no_gl(error: Exception) -> WbmpcError:
+    backend = os.environ.get("MUJOCO_GL", "")
+    reason = (str(error).splitlines() or [type(error).__name__])[0]
+    if backend == "disable":
+        reason = "neither libEGL nor libOSMesa can be loaded"
+    return WbmpcError(_NO_GL.format(backend=backend, reason=reason, packages=_PACKAGES))
+
+
+if sys.platform == "linux":  # elsewhere MuJoCo's own choice needs no screen
+    os.environ.setdefault("MUJOCO_GL", _backend())
+try:
+    import mujoco
+except (AttributeError, RuntimeError) as error:  # MUJOCO_GL names a library that is not there, or nothing known
+    raise _no_gl(error) from error
 
 FORMATS = (".png", ".webp", ".gif")
 _METRES_PER_NEWTON = 0.015  # of an arrow: longer than in a recording, for a picture cannot be turned
@@ -34,8 +62,6 @@ _COM_RGBA = (1.0, 0.65, 0.16, 1.0)
 _SUPPORT_RGBA = (0.10, 0.45, 0.30, 1.0)
 _LOOK_AHEAD = (0.08, 0.0, 0.0)  # [m] from the CoM: what the robot reaches for is before it
 _LEAST_DRAWN_FORCE = 0.2  # [N] a shorter arrow is all head
-_NO_GL = "no off-screen OpenGL (MUJOCO_GL={backend}): {reason}. On Debian: apt-get install {packages}"
-_PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,11 +139,8 @@ def _renderer(model: Any, picture: Picture) -> Iterator[Any]:
     model.vis.global_.offheight = max(model.vis.global_.offheight, picture.height)
     try:
         renderer = mujoco.Renderer(model, picture.height, picture.width)
-    except Exception as error:  # each GL backend has its own kind
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise WbmpcError(
-            _NO_GL.format(backend=os.environ.get("MUJOCO_GL", ""), reason=reason, packages=_PACKAGES)
-        ) from error
+    except Exception as error:  # each OpenGL has its own kind
+        raise _no_gl(error) from error
     try:
         yield renderer
     finally:

@@ -20,7 +20,7 @@ from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.plans import describe_plans, write_plans
 from wbmpc.rerun_sink.scene import Patch, Scene
 from wbmpc.rerun_sink.stream import Stream
-from wbmpc.rerun_sink.ticks import describe_ticks, write_ticks
+from wbmpc.rerun_sink.ticks import describe_ticks, write_ticks, write_tracker_status
 
 APPLICATION = "wbmpc"
 
@@ -80,6 +80,7 @@ class RerunSink:
         self._scene = Scene(self._stream, model, patches)
         describe_ticks(self._stream, joint_names)
         describe_plans(self._stream)
+        recording.flush()  # a run killed at once still says what it was
 
     def flush(self, now: float | None = None) -> None:
         """Write what is new; with `now` [s], only when a block's time has passed (cheap enough for every tick)."""
@@ -91,8 +92,9 @@ class RerunSink:
         self._ticks_done = recorder.ticks
         rows = np.arange(-(-first // self._stride) * self._stride, self._ticks_done, self._stride)
         if len(rows):
-            write_ticks(self._stream, recorder, rows, since=first)
+            write_ticks(self._stream, recorder, rows, self._stride)
             self._scene.write_poses(recorder.time[rows], recorder.qpos[rows])
+        write_tracker_status(self._stream, recorder, first)
         self._flush_plans()
         self._flush_events()
         # Blocking: once this returns the block is in the file, whatever happens to the process.

@@ -45,8 +45,8 @@ def describe_ticks(stream: Stream, joint_names: Sequence[str]) -> None:
         stream.static(f"/world/hands/{side}/planned_force", rr.Arrows3D.from_fields(radii=0.004, colors=[PLANNED]))
 
 
-def write_ticks(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], since: int) -> None:
-    """Send the ticks `rows`; whatever must not be lost by thinning is taken over all ticks from `since` on."""
+def write_ticks(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], stride: int) -> None:
+    """Send the ticks `rows`, every `stride`-th of the run."""
     time = recorder.time[rows]
     stream.scalars("/state/qpos", time, recorder.qpos[rows])
     stream.scalars("/state/qvel", time, recorder.qvel[rows])
@@ -54,7 +54,16 @@ def write_ticks(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], sin
     _write_hands_and_feet(stream, recorder, rows, time)
     _write_contacts(stream, recorder, rows, time)
     _write_joints(stream, recorder, rows, time)
-    _write_solver(stream, recorder, rows, time, since)
+    # Each sample carries the worst tick since the one before: thinning must not hide a slow solve.
+    worst = [recorder.command_solve_time[max(0, k - stride + 1) : k + 1].max() for k in rows]
+    stream.scalars("/solvers/tracker", time, 1e3 * np.array(worst))
+
+
+def write_tracker_status(stream: Stream, recorder: Recorder, since: int) -> None:
+    """Send the changes of the tracker's status over all ticks from `since` on: thinning must not hide a failure."""
+    status, fallback = recorder.command_status[since:], recorder.command_fallback[since:]
+    names = [SolveStatus(s).name + (", fallback" if f else "") for s, f in zip(status, fallback, strict=True)]
+    stream.states("/solver_status/tracker", recorder.time[since:], names)
 
 
 def _write_balance(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]) -> None:
@@ -115,18 +124,6 @@ def _write_joints(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], t
     stream.scalars("/joints/torque_share", time, np.abs(torque) / np.maximum(np.abs(limit), 1e-9))
     stream.scalars("/joints/velocity", time, velocity)
     stream.scalars("/joints/posture_error", time, position - recorder.setpoint_joint_position[rows])
-
-
-def _write_solver(
-    stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64], since: int
-) -> None:
-    # Each sample carries the worst tick since the one before: thinning must not hide a slow or failed solve.
-    solve_time, previous = recorder.command_solve_time, np.concatenate([[since], rows[:-1] + 1])
-    worst = [solve_time[a : b + 1].max() for a, b in zip(np.minimum(previous, rows), rows, strict=True)]
-    stream.scalars("/solvers/tracker", time, 1e3 * np.array(worst))
-    status, fallback = recorder.command_status[since:], recorder.command_fallback[since:]
-    names = [SolveStatus(s).name + (", fallback" if f else "") for s, f in zip(status, fallback, strict=True)]
-    stream.states("/solver_status/tracker", recorder.time[since:], names)
 
 
 def _hues(count: int) -> list[Colour]:
