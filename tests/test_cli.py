@@ -106,7 +106,14 @@ def test_a_passing_run_exits_0_and_leaves_its_verdict(
     assert all(list(row) == CHECK_KEYS for row in document["checks"])
     assert (document["passed"], document["seed"], document["state_sha256"]) == (True, 3, "ab" * 32)
     assert document["metrics"]["first_hand_contact"] is None  # JSON has no nan
-    assert document["timing"] == {"real_time_factor": 1.5, "missed_deadlines": 0}
+    assert document["timing"] == {
+        "real_time_factor": 1.5,
+        "missed_deadlines": 0,
+        "late_plans": 0,
+        "skipped_plans": 0,
+        "plan_latency_p50": None,
+        "plan_latency_p99": None,
+    }
     assert document["versions"]["mujoco"] != "absent"
 
 

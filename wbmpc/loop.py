@@ -39,7 +39,13 @@ class LoopTiming:
     simulated_time: float = 0.0  # [s]
     missed_deadlines: int = 0  # ticks that began late against the wall clock; 0 in lockstep
     late_plans: int = 0  # plans that were not ready one planner period after their snapshot; 0 in lockstep
-    plan_latency: list[float] = field(default_factory=list)  # [s] from a plan's snapshot to its availability
+    skipped_plans: int = 0  # snapshots that a newer one replaced before the planner came to them; 0 in lockstep
+    plan_latency: list[float] = field(default_factory=list)  # [s] loop time from a plan's snapshot to its availability
+
+    @property
+    def drift(self) -> float:
+        """By how much simulated time lags the wall clock at the end [s]; negative when it is ahead."""
+        return self.wall_time - self.simulated_time
 
 
 class Session:
@@ -85,7 +91,10 @@ class Session:
         recorder.append_plan(first.report)
 
     def tick(self, plan: Callable[[RobotState], None] | None) -> bool:
-        """One tick of the loop; `plan` is called with the state when a plan is due. False: the state is not finite."""
+        """One tick of either loop; False: the state is not finite.
+
+        `plan` is called with the new state before the setpoint is sampled: what it posts may take effect in this tick.
+        """
         state = self.estimator.update(self.plant.measure())
         if plan is not None:
             plan(state)

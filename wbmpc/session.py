@@ -73,6 +73,9 @@ def run_scenario(
             solver=solver_statistics(recorder),
             real_time_factor=timing.simulated_time / timing.wall_time if timing.wall_time > 0 else 0.0,
             missed_deadlines=timing.missed_deadlines,
+            late_plans=timing.late_plans,
+            skipped_plans=timing.skipped_plans,
+            plan_latency=timing.plan_latency,
             state_sha256=recorder.state_sha256,
         )
         if sink is not None:

@@ -29,6 +29,9 @@ class Verdict:
     real_time_factor: float  # simulated time per wall time
     missed_deadlines: int
     state_sha256: str
+    late_plans: int = 0
+    skipped_plans: int = 0
+    plan_latency: Sequence[float] = ()  # [s] of every plan
     versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
@@ -50,11 +53,22 @@ class Verdict:
             "checks": [asdict(check) for check in self.checks],
             "metrics": dict(self.metrics),
             "solver": {stage: dict(row) for stage, row in self.solver.items()},
-            "timing": {"real_time_factor": self.real_time_factor, "missed_deadlines": self.missed_deadlines},
+            "timing": self._timing(),
             "versions": dict(self.versions),
             "state_sha256": self.state_sha256,
         }
         return finite(document)
+
+    def _timing(self) -> dict[str, float]:
+        p50, p99 = np.percentile(self.plan_latency, [50, 99]) if self.plan_latency else (math.nan, math.nan)
+        return {
+            "real_time_factor": self.real_time_factor,
+            "missed_deadlines": self.missed_deadlines,
+            "late_plans": self.late_plans,
+            "skipped_plans": self.skipped_plans,
+            "plan_latency_p50": float(p50),
+            "plan_latency_p99": float(p99),
+        }
 
     def write(self, path: Path) -> None:
         """Write the JSON document to `path`, whole or not at all."""

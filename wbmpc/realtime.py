@@ -1,0 +1,174 @@
+"""The real-time loop: the tick of the lockstep loop against the wall clock, the planner in a thread of its own."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from queue import Empty, SimpleQueue
+from threading import Thread
+from time import perf_counter, sleep
+
+import mujoco
+
+from wbmpc.loop import FLUSH_TICKS, LoopTiming, Session, Sink
+from wbmpc.mailbox import Mailbox
+from wbmpc.planner.planner import Planner
+from wbmpc.recorder import Recorder
+from wbmpc.robot import Robot
+from wbmpc.scenario import Scenario, build_world
+from wbmpc.signals import RobotState
+
+SPIN = 3e-4  # [s] before a deadline in which the tick thread no longer trusts a sleep to end in time
+SWITCH_INTERVAL = 1e-4  # [s] after which the tick thread, awake, gets the interpreter back from the planner
+WARM_UP_TICKS = 20  # made in a session that is thrown away: first calls load libraries and compile
+
+
+def run_realtime(
+    scenario: Scenario,
+    *,
+    robot: Robot,
+    recorder: Recorder,
+    model: mujoco.MjModel | None = None,
+    sink: Sink | None = None,
+    on_progress: Callable[[float], None] | None = None,
+) -> LoopTiming:
+    """Run a scenario against the wall clock; `run_lockstep` has the same arguments and makes the same ticks.
+
+    Tick k belongs at `start + k · timestep`. It is never skipped: on a machine that cannot keep up, simulated time lags
+    the wall clock, later ticks follow without a pause until the lag is made up, and every tick that begins more than a
+    timestep late counts as a missed deadline.
+
+    A plan takes effect at the first tick after it is ready. Its latency is counted in the loop's time, from the state
+    it was computed from to that tick, so that a lockstep run that charges the recorded latencies to the plans at their
+    recorded times repeats the run bit for bit. A plan later than one planner period is counted; a snapshot that a
+    newer one replaced before the planner came to it is counted as skipped.
+
+    Args:
+        sink: flushed once, after the last tick, because a flush waits for the file: a killed run leaves an empty one.
+
+    Raises:
+        Exception: whatever the planner raised in its thread.
+    """
+    if model is None:
+        model = build_world(scenario, robot.path)
+    _warm_up(scenario, robot, model)
+    session = Session(scenario, robot=robot, model=model, recorder=recorder)
+    period, step, timing = scenario.loop.planner_period_ticks, session.step, LoopTiming()
+    worker = PlannerThread(session.planner, session.mailbox)
+    session.mailbox.arrived(0.0)  # the first plan, which the session made and recorded itself
+    due = False
+
+    def exchange(state: RobotState) -> None:
+        """Take the plans that are ready, hand over a snapshot when one is due."""
+        worker.check()
+        for plan in session.mailbox.arrived(state.time):
+            recorder.append_plan(plan.report)
+            latency = state.time - plan.time
+            timing.plan_latency.append(latency)
+            timing.late_plans += latency > (period + 0.5) * step
+        if due:
+            worker.request(state)
+
+    with _undisturbed(), worker:
+        start = perf_counter()
+        for k in range(session.ticks):
+            slot = start + k * step
+            timing.missed_deadlines += _wait_until(slot) > step
+            due = k % period == 0 and k > 0
+            if not session.tick(exchange):
+                recorder.event(session.plant.time, "state is not finite, run ended")
+                break
+            if on_progress is not None and (k + 1) % FLUSH_TICKS == 0:
+                on_progress(session.plant.time)
+        timing.wall_time, timing.simulated_time = perf_counter() - start, session.plant.time
+    worker.check()
+    timing.skipped_plans = worker.skipped
+    if sink is not None:
+        sink.flush(session.plant.time)
+    return timing
+
+
+class PlannerThread:
+    """Solves on the newest snapshot it was given and posts the plan; a context manager: start on entry, join on exit.
+
+    `request` and `check` belong to the tick thread and never wait for the planner.
+    """
+
+    def __init__(self, planner: Planner, mailbox: Mailbox) -> None:
+        """`planner` is used by this thread alone from entry to exit; `mailbox` receives its plans."""
+        self._planner, self._mailbox = planner, mailbox
+        self._requests: SimpleQueue[RobotState | None] = SimpleQueue()  # None: stop
+        self._thread = Thread(target=self._run, name="planner", daemon=True)
+        self._error: BaseException | None = None
+        self.skipped = 0  # snapshots that a newer one replaced
+
+    def request(self, snapshot: RobotState) -> None:
+        """Ask for a plan. The snapshot must not change afterwards."""
+        self._requests.put(snapshot)
+
+    def check(self) -> None:
+        """Raise what the planner raised."""
+        if self._error is not None:
+            raise self._error
+
+    def __enter__(self) -> PlannerThread:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._requests.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        try:
+            while (snapshot := self._newest()) is not None:
+                # Ready is ready: whichever tick comes next may use it.
+                self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
+        except BaseException as error:  # a thread cannot raise into another: `check` does
+            self._error = error
+
+    def _newest(self) -> RobotState | None:
+        """Wait for a request; of several that wait, the newest. None: stop."""
+        newest = self._requests.get()
+        while newest is not None:
+            try:
+                following = self._requests.get_nowait()
+            except Empty:
+                break
+            self.skipped += following is not None
+            newest = following
+        return newest
+
+
+def _wait_until(deadline: float) -> float:
+    """Sleep, then spin until `deadline` [s]; returns by how much it is late [s]."""
+    ahead = deadline - perf_counter()
+    if ahead > SPIN:
+        sleep(ahead - SPIN)
+    while (now := perf_counter()) < deadline:
+        sleep(0)  # gives the interpreter to the planner, which a bare spin would keep from it
+    return now - deadline
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """No garbage collection, and short turns of the interpreter, for as long as the loop runs."""
+    collecting, interval = gc.isenabled(), sys.getswitchinterval()
+    gc.collect()
+    gc.disable()
+    sys.setswitchinterval(SWITCH_INTERVAL)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(interval)
+        if collecting:
+            gc.enable()
+
+
+def _warm_up(scenario: Scenario, robot: Robot, model: mujoco.MjModel) -> None:
+    recorder = Recorder(robot, expected_ticks=WARM_UP_TICKS, plant_nq=model.nq, plant_nv=model.nv)
+    session = Session(scenario, robot=robot, model=model, recorder=recorder)
+    for _ in range(WARM_UP_TICKS):
+        session.tick(None)
