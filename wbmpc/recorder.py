@@ -1,7 +1,8 @@
 """In-memory columns of one run: the only source of the checks and of the recording file.
 
-One row a tick, written into preallocated arrays that double when full: nothing is formatted, logged or allocated in the
-hot loop. Contacts vary in number, so they are kept ragged: one flat table of contacts, and each tick's count.
+One row a tick, gathered in a small buffer and copied into a preallocated table that doubles when full: nothing is
+formatted, logged or allocated in the hot loop, and one place in memory is written, not one for each column. Contacts
+vary in number, so they are kept ragged: one flat table of contacts, and each tick's count.
 The hash over the state trajectory lives here, whether or not a file is written.
 """
 
@@ -137,12 +138,15 @@ class Recorder:
     ) -> None:
         size = {"Q": plant_nq or robot.nq, "V": plant_nv or robot.nv, "q": robot.nq, "v": robot.nv, "j": robot.nj}
         self._capacity = max(1, expected_ticks)
-        self._columns: dict[str, NDArray[Any]] = {}
-        for _, prefix, fields in LAYOUT:
-            for name, (shape, dtype) in fields.items():
-                full = (self._capacity, *(size[s] if isinstance(s, str) else s for s in shape))
-                self._columns[prefix + name] = np.zeros(full, dtype=dtype)
-        self._rows = tuple(self._columns.values())
+        row = [
+            (prefix + name, kind, tuple(size[s] if isinstance(s, str) else s for s in shape))
+            for _, prefix, fields in LAYOUT
+            for name, (shape, kind) in fields.items()
+        ]
+        self._table = np.zeros(self._capacity, np.dtype(row, align=True))
+        self._row = np.zeros((), self._table.dtype)
+        self._cells = tuple(self._row[name] for name in self.names)
+        self._qpos, self._qvel = self._row["qpos"].data, self._row["qvel"].data  # bytes for the hash
         self._contact_capacity = 12 * self._capacity
         self._contact_total = 0
         self._contacts = self._allocate_contacts(self._contact_capacity)
@@ -165,12 +169,13 @@ class Recorder:
             self._check_shapes(values)
         elif k == self._capacity:
             self._grow()
-        for column, value in zip(self._rows, values, strict=True):
-            column[k] = value
+        for cell, value in zip(self._cells, values, strict=True):
+            cell[...] = value
+        self._table[k] = self._row
         self._append_contacts(truth)
-        # The stored rows, not the caller's arrays: always contiguous float64, so equal states give equal bytes.
-        self._hash.update(self._columns["qpos"][k])
-        self._hash.update(self._columns["qvel"][k])
+        # The row's cells, not the caller's arrays: always contiguous float64, so equal states give equal bytes.
+        self._hash.update(self._qpos)
+        self._hash.update(self._qvel)
         self._ticks = k + 1  # last: a reader in another thread never sees a half-written row
 
     def append_plan(self, plan: PlanReport) -> None:
@@ -193,7 +198,7 @@ class Recorder:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all columns, each an attribute of the recorder."""
-        return tuple(self._columns)
+        return tuple(self._table.dtype.names or ())
 
     @property
     def state_sha256(self) -> str:
@@ -206,9 +211,9 @@ class Recorder:
         Raises:
             KeyError: with the choices, when there is no such column.
         """
-        if name not in self._columns:
-            raise KeyError(f"no column {name!r}; choose one of {', '.join(self._columns)}")
-        view = self._columns[name][: self._ticks]
+        if name not in self.names:
+            raise KeyError(f"no column {name!r}; choose one of {', '.join(self.names)}")
+        view: NDArray[Any] = self._table[name][: self._ticks]
         view.flags.writeable = False
         return view
 
@@ -222,7 +227,7 @@ class Recorder:
             raise AttributeError(error.args[0]) from None
 
     def __dir__(self) -> Iterable[str]:
-        return [*super().__dir__(), *self._columns]
+        return [*super().__dir__(), *self.names]
 
     @property
     def contacts(self) -> Contacts:
@@ -266,13 +271,12 @@ class Recorder:
         self._contact_total = stop
 
     def _check_shapes(self, values: tuple[Any, ...]) -> None:
-        for (name, column), value in zip(self._columns.items(), values, strict=True):
-            if np.shape(value) != column.shape[1:]:
-                raise ValueError(f"{name}: got shape {np.shape(value)}, expected {column.shape[1:]}")
+        for name, cell, value in zip(self.names, self._cells, values, strict=True):
+            if np.shape(value) != cell.shape:
+                raise ValueError(f"{name}: got shape {np.shape(value)}, expected {cell.shape}")
 
     def _grow(self) -> None:
-        self._columns = {name: np.concatenate([old, np.zeros_like(old)]) for name, old in self._columns.items()}
-        self._rows = tuple(self._columns.values())
+        self._table = np.concatenate([self._table, np.zeros_like(self._table)])
         self._capacity *= 2
 
     def _grow_contacts(self) -> None:

@@ -72,7 +72,7 @@ class RerunSink:
         _open(recording, path, model)
         self._stream = Stream(recording)
         recording.send_recording_name(drawable(f"{scenario_name}, seed {seed}"))
-        self._stream.properties("run", {"scenario": scenario_name, "seed": seed, "sample_rate": rate})
+        self._stream.properties("run", {"scenario": scenario_name, "seed": seed, "sample_rate": float(rate)})
         self._stream.properties("versions", versions or {})
         self._stream.document("/scenario", f"~~~~yaml\n{scenario_text}\n~~~~")
         self._stream.document("/verdict", "No verdict: the run did not end.")
