@@ -2,15 +2,17 @@
 
     python -m benchmarks.record_instances [--out tests/qp/instances]
 
-Runs `reach` in lockstep and keeps one problem for each line of MOMENTS: the first one that a solver
-answers at or after the stated time. Run it again when the shape of a problem changes.
+Runs `reach` in lockstep, as it is and with a table that bears 0.05 N, and keeps one problem for each line of MOMENTS:
+the first one that a solver answers at or after the stated time. Run it again when a problem's shape changes.
 """
 
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from benchmarks.taps import Tap, tapped
 from wbmpc.loop import run_lockstep
@@ -31,8 +33,20 @@ class Moment:
     tap: str  # see benchmarks/taps.py
     time: float  # [s]
     status: SolveStatus = SolveStatus.SOLVED
+    run: str = "reach"  # of RUNS
 
 
+class _Enough(Exception):
+    """Nothing is left to keep of this run."""
+
+
+RUNS = {
+    "reach": {},
+    "weak_table": {
+        "patches": {"weak": {"on": "table", "offset": [-0.06, -0.11], "force_cap": 0.05}},
+        "checks": [{"kind": "upright_at_end"}],
+    },
+}
 MOMENTS = (
     Moment("stage1_start", "ComHeightStage 1", 0.0),
     Moment("stage1_lean", "ComHeightStage 1", 6.0),
@@ -41,12 +55,34 @@ MOMENTS = (
     Moment("stage2_execute_approach", "WholeBodyStage 2", 3.0),
     Moment("stage2_execute_lean", "WholeBodyStage 2", 8.5),
     Moment("stage3_choice", "ContactChoice 1", 0.0),  # the mixed-integer problem when a contact is needed
-    Moment("stage3_hopeless", "ContactChoice 2", 0.0, SolveStatus.INFEASIBLE),  # one candidate that cannot help
+    Moment("stage3_hopeless", "ContactChoice 1", 0.0, SolveStatus.INFEASIBLE, run="weak_table"),  # no candidate helps
     Moment("stage3_force_ramp", "ContactForce 1", 4.0),
     Moment("stage3_force_lean", "ContactForce 1", 8.5),
     Moment("tracker_stand", "Tracker 1", 1.0),
     Moment("tracker_braced", "Tracker 1", 8.5),
 )
+
+
+def record(run: str, changes: dict[str, Any], out: Path) -> None:
+    """Save the moments of one run in the folder `out`."""
+    scenario = load_scenario(ROOT / "scenarios" / "reach.yaml", changes)
+    robot = Robot.load(robot_path(scenario))
+    recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
+    left = {moment.name: moment for moment in MOMENTS if moment.run == run}
+
+    def keep(tap: Tap, solution: QpSolution) -> None:
+        time = recorder.plans[-1].time if recorder.plans else 0.0
+        for name, moment in list(left.items()):
+            if tap.label == moment.tap and time >= moment.time and solution.status is moment.status:
+                save_instance(tap.problem, out / f"{name}.npz")
+                del left[name]
+        if not left:
+            raise _Enough
+
+    with tapped(keep), suppress(_Enough):
+        run_lockstep(scenario, robot=robot, recorder=recorder)
+    for moment in left.values():
+        print(f"{moment.name}: {moment.tap} had no {moment.status.name} problem from {moment.time:g} s on")
 
 
 def main() -> None:
@@ -55,25 +91,11 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "tests" / "qp" / "instances")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
-    scenario = load_scenario(ROOT / "scenarios" / "reach.yaml")
-    robot = Robot.load(robot_path(scenario))
-    recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
-    left = {moment.name: moment for moment in MOMENTS}
-
-    def keep(tap: Tap, solution: QpSolution) -> None:
-        time = recorder.plans[-1].time if recorder.plans else 0.0
-        for name, moment in list(left.items()):
-            if tap.label == moment.tap and time >= moment.time and solution.status is moment.status:
-                save_instance(tap.problem, out / f"{name}.npz")
-                del left[name]
-
-    with tapped(keep):
-        run_lockstep(scenario, robot=robot, recorder=recorder)
+    for run, changes in RUNS.items():
+        record(run, changes, out)
     for path in sorted(out.glob("*.npz")):
         problem = load_instance(path)
         print(f"{path.name}: {problem.variables} variables, {problem.rows} rows, {path.stat().st_size / 1e3:.1f} kB")
-    for moment in left.values():
-        print(f"{moment.name}: {moment.tap} had no {moment.status.name} problem from {moment.time:g} s on")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ ALL = qp_backend_names()
 # HiGHS' QP fails on about 1 % of dense problems (wbmpc/qp/highs_models.py): judged apart, by honest statuses.
 RELIABLE = [name for name in ALL if name != "qpsolvers:highs"]
 INSTANCES = sorted(Path(__file__).parent.glob("instances/*.npz"))
+CONTINUOUS = [path for path in INSTANCES if not load_instance(path).binary.size]
 shapes = st.tuples(st.integers(1, 24), st.integers(0, 24), st.integers(0, 8), st.integers(0, 8)).map(
     lambda s: (s[0], s[1], min(s[2], s[1] // 3, s[0] // 3), min(s[3], s[1] // 2))
 )
@@ -209,18 +210,29 @@ def test_solution_outlives_the_next_solve():
     np.testing.assert_array_equal(first, kept)
 
 
-@pytest.mark.parametrize("path", INSTANCES, ids=lambda path: path.stem)
-def test_recorded_instances(path):
+@pytest.mark.parametrize("path", CONTINUOUS, ids=lambda path: path.stem)
+def test_default_solves_recorded_instances(path):
     problem = load_instance(path)
-    if problem.binary.size:
-        pytest.skip("mixed-integer: see test_qp_mixed_integer.py")
-    solutions = {name: make_workspace(name, problem).solve() for name in NATIVE}
-    assert {solution.status for solution in solutions.values()} == {solutions["daqp"].status}
-    if solutions["daqp"].solved:
-        assert kkt_residual(problem, solutions["daqp"].x) < 1e-5
-        cost = problem.objective(solutions["daqp"].x)
-        for name, solution in solutions.items():
-            assert problem.objective(solution.x) == pytest.approx(cost, rel=1e-3, abs=1e-6), name
+    solution = make_workspace("daqp", problem).solve()
+    assert solution.status is SolveStatus.SOLVED
+    assert kkt_residual(problem, solution.x) < 1e-8
+
+
+@pytest.mark.parametrize("backend", [name for name in ALL if name != "daqp"])
+def test_backends_never_differ_on_recorded_instances(backend):
+    """Weights from 1e-5 to 1e5 in one problem are hard for ADMM: OSQP may say so, but not answer something else."""
+    solved = 0
+    for path in CONTINUOUS:
+        problem = load_instance(path)
+        solution = make_workspace(backend, problem).solve()
+        if not solution.solved:
+            assert solution.status in (SolveStatus.ITERATION_LIMIT, SolveStatus.NUMERICAL_ERROR), path.stem
+            continue
+        solved += 1
+        cost = problem.objective(make_workspace("daqp", problem).solve().x)
+        assert problem.objective(solution.x) == pytest.approx(cost, rel=1e-5), path.stem
+        assert kkt_residual(problem, solution.x) < 1e-4, path.stem
+    assert solved >= 0.7 * len(CONTINUOUS) > 0
 
 
 def test_unknown_backend_lists_the_choices():

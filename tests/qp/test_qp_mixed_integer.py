@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from random_problems import brute_force, random_problem
 
 from wbmpc.errors import WbmpcError
-from wbmpc.qp import MIQP_BACKENDS, QuadraticProgram, load_instance, make_mip_workspace
+from wbmpc.qp import MIQP_BACKENDS, QuadraticProgram, load_instance, make_mip_workspace, make_workspace
 from wbmpc.qp.highs_mixed_integer import HighsOuterApproximation
 from wbmpc.signals import SolveStatus
 
 BACKENDS = list(MIQP_BACKENDS)
-INSTANCES = sorted(Path(__file__).parent.glob("instances/*.npz"))
+MIXED = [p for p in sorted(Path(__file__).parent.glob("instances/*.npz")) if load_instance(p).binary.size]
 
 
 def with_binaries(continuous: QuadraticProgram, binaries: int) -> QuadraticProgram:
@@ -119,15 +119,35 @@ def test_limit_of_rounds_is_a_status():
     assert HighsOuterApproximation(problem, round_limit=1).solve().status is SolveStatus.ITERATION_LIMIT
 
 
-@pytest.mark.parametrize("path", INSTANCES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", MIXED, ids=lambda path: path.stem)
 def test_recorded_instances(path):
     problem = load_instance(path)
-    if not problem.binary.size:
-        pytest.skip("continuous: see test_qp_backends.py")
     solutions = [make_mip_workspace(name, problem).solve() for name in BACKENDS]
     assert solutions[0].status is solutions[1].status
     if solutions[0].solved:
-        assert problem.objective(solutions[0].x) == pytest.approx(problem.objective(solutions[1].x), rel=1e-5)
+        np.testing.assert_array_equal(solutions[0].x[problem.binary], solutions[1].x[problem.binary])
+        assert problem.objective(solutions[0].x) == pytest.approx(problem.objective(solutions[1].x), rel=1e-6)
+
+
+@pytest.mark.parametrize("path", MIXED, ids=lambda path: path.stem)
+def test_recorded_choice_is_the_cheapest_candidate(path):
+    """ΣH = 1: fixing each binary in turn and solving the QP that is left is an independent way to the optimum."""
+    problem = load_instance(path)
+    cost = np.full(problem.binary.size, np.inf)
+    for candidate in range(problem.binary.size):
+        fixed = QuadraticProgram(problem.variables, problem.rows, problem.soft_weight)
+        fixed.copy_from(problem)
+        fixed.x_lower[problem.binary] = fixed.x_upper[problem.binary] = np.eye(problem.binary.size)[candidate]
+        if (
+            problem.x_upper[problem.binary[candidate]] == 1.0
+            and (solution := make_workspace("daqp", fixed).solve()).solved
+        ):
+            cost[candidate] = problem.objective(solution.x)
+    solution = make_mip_workspace("daqp", problem).solve()
+    assert np.isfinite(cost).any() == solution.solved
+    if solution.solved:
+        assert int(solution.x[problem.binary].argmax()) == int(cost.argmin())
+        assert problem.objective(solution.x) == pytest.approx(cost.min(), rel=1e-6)
 
 
 def test_unknown_backend_lists_the_choices():
