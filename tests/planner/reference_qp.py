@@ -1,39 +1,55 @@
-"""A tiny modelling layer over OSQP, for problems written a second time: every quantity a variable, nothing condensed."""
+"""A tiny modelling layer over SciPy's NNLS, for problems written a second time: every quantity a variable."""
 
 from __future__ import annotations
 
 import numpy as np
-import osqp
-import scipy.sparse as sp
+from scipy.linalg import cholesky, qr, solve_triangular
+from scipy.optimize import nnls
 
 from wbmpc.signals import Vector
 
+Terms = list[tuple[slice, Vector]]
+
+
+class InfeasibleReference(Exception):
+    """The constraints of a reference problem contradict each other."""
+
 
 class ReferenceQp:
-    """minimise ½ Σ w |A x − b|² subject to lower ≤ A x ≤ upper, with variables handed out in blocks of columns."""
+    """minimise ½ Σ w |Σ A x − b|² subject to lower ≤ Σ A x ≤ upper, with variables handed out in blocks of columns.
+
+    Equalities are eliminated with an orthogonal basis; the rest is a least-distance problem, which Lawson and Hanson
+    (1974, ch. 23) reduce to non-negative least squares: an exact active-set method that shares no code with the
+    project's solvers.
+    """
 
     def __init__(self) -> None:
         self._size = 0
-        self._terms: list[tuple[dict[int, Vector], Vector, float]] = []
-        self._rows: list[tuple[dict[int, Vector], Vector, Vector]] = []
+        self._costs: list[tuple[Terms, Vector, float]] = []
+        self._equalities: list[tuple[Terms, Vector]] = []
+        self._rows: list[tuple[Terms, Vector]] = []  # Σ A x ≤ b
 
     def variables(self, count: int) -> slice:
-        block = slice(self._size, self._size + count)
+        """Columns of `count` new variables."""
         self._size += count
-        return block
+        return slice(self._size - count, self._size)
 
-    def cost(self, terms: list[tuple[slice, Vector]], target: Vector | float, weight: float) -> None:
+    def cost(self, terms: Terms, target: Vector | float, weight: float) -> None:
         """½ weight |Σ A_i x_i − target|²."""
-        self._terms.append((self._columns(terms), np.atleast_1d(target), weight))
+        self._costs.append((terms, np.atleast_1d(target), weight))
 
-    def bound(self, terms: list[tuple[slice, Vector]], lower: Vector | float, upper: Vector | float) -> None:
-        """lower ≤ Σ A_i x_i ≤ upper."""
-        rows = np.atleast_2d(terms[0][1]).shape[0]
-        self._rows.append((self._columns(terms), np.broadcast_to(lower, rows), np.broadcast_to(upper, rows)))
+    def equal(self, terms: Terms, target: Vector | float) -> None:
+        """Σ A_i x_i = target."""
+        self._equalities.append((terms, np.atleast_1d(target)))
 
-    def soft_bound(self, terms: list[tuple[slice, Vector]], lower: Vector, upper: Vector, weight: float) -> None:
+    def bound(self, terms: Terms, lower: Vector, upper: Vector) -> None:
+        """lower ≤ Σ A_i x_i ≤ upper, ±inf where there is no bound."""
+        self._rows.append((terms, np.asarray(upper)))
+        self._rows.append(([(block, -A) for block, A in terms], -np.asarray(lower)))
+
+    def soft_bound(self, terms: Terms, lower: Vector, upper: Vector, weight: float) -> None:
         """The same with a slack of price ½ weight s² per row."""
-        rows = np.atleast_2d(terms[0][1]).shape[0]
+        rows = len(terms[0][1])
         slack = self.variables(rows)
         self.bound([*terms, (slack, np.eye(rows))], lower, upper)
         self.cost([(slack, np.eye(rows))], np.zeros(rows), weight)
@@ -42,56 +58,61 @@ class ReferenceQp:
         """One CoM axis: jerks, positions, velocities, accelerations, tied by [M] eq. state-eq step by step."""
         A = np.array([[1, step, step**2 / 2], [0, 1, step], [0, 0, 1]])
         B = np.array([step**3 / 6, step**2 / 2, step])
-        jerk, c, dc, ddc = (self.variables(steps) for _ in range(4))
-        for k in range(steps):
-            for row, block in enumerate((c, dc, ddc)):
-                terms = [(_one(block, k), np.eye(1)), (_one(jerk, k), np.array([[-B[row]]]))]
-                known = float(A[row] @ state) if k == 0 else 0.0
-                if k > 0:
-                    terms += [(_one(b, k - 1), np.array([[-A[row, j]]])) for j, b in enumerate((c, dc, ddc))]
-                self.bound(terms, known, known)
-        return jerk, c, dc, ddc
+        jerk, *motion = (self.variables(steps) for _ in range(4))
+        now, before = np.eye(steps), np.eye(steps, k=-1)
+        for row, block in enumerate(motion):
+            terms = [(block, now), (jerk, -B[row] * now)]
+            terms += [(other, -A[row, j] * before) for j, other in enumerate(motion)]
+            self.equal(terms, np.concatenate([[A[row] @ state], np.zeros(steps - 1)]))
+        return jerk, *motion
 
     def solve(self) -> tuple[Vector, float]:
         """Minimiser and ½ Σ w |…|² at it.
 
         Raises:
-            AssertionError: OSQP did not solve it to 1e-9.
+            InfeasibleReference: no point satisfies the constraints.
         """
-        n = self._size
-        H, g, constant = sp.csc_matrix((n, n)), np.zeros(n), 0.0
-        for columns, target, weight in self._terms:
-            A = _assemble(columns, n)
-            H, g = H + weight * A.T @ A, g - weight * (A.T @ target)
-            constant += 0.5 * weight * float(target @ target)
-        A = sp.vstack([_assemble(columns, n) for columns, _, _ in self._rows]).tocsc()
-        lower = np.concatenate([low for _, low, _ in self._rows])
-        upper = np.concatenate([high for _, _, high in self._rows])
-        solver = osqp.OSQP()
-        scale = 1.0 / max(abs(H).max(), 1.0)
-        solver.setup(
-            P=sp.triu(H * scale).tocsc(), q=g * scale, A=A, l=lower, u=upper, verbose=False, eps_abs=1e-9, eps_rel=1e-9,
-            max_iter=200_000, polishing=True, adaptive_rho_interval=50, scaling=20, check_termination=50,
-        )  # fmt: skip
-        result = solver.solve(raise_error=False)
-        self.status = result.info.status
-        if result.info.status != "solved":
-            raise AssertionError(f"the reference itself failed: {result.info.status}")
-        x = result.x
-        return x, float(0.5 * x @ (H @ x) + g @ x + constant)
+        F = np.vstack([np.sqrt(w) * self._dense(terms) for terms, _, w in self._costs])
+        f = np.concatenate([np.sqrt(w) * target for _, target, w in self._costs])
+        start, basis = np.zeros(self._size), np.eye(self._size)
+        if self._equalities:
+            E = np.vstack([self._dense(terms) for terms, _ in self._equalities])
+            start = np.linalg.lstsq(E, np.concatenate([target for _, target in self._equalities]), rcond=None)[0]
+            rank = np.linalg.matrix_rank(E)
+            basis = qr(E.T)[0][:, rank:]
+        FZ = F @ basis
+        R = cholesky(FZ.T @ FZ)  # upper
+        shift = solve_triangular(R, FZ.T @ (f - F @ start), trans="T")  # z = R y − shift
+        y = solve_triangular(R, shift)
+        if self._rows:
+            G = np.vstack([self._dense(terms) for terms, _ in self._rows])
+            h = np.concatenate([bound for _, bound in self._rows])
+            kept = np.isfinite(h)
+            G, h = G[kept], h[kept]
+            slope = -solve_triangular(R, (G @ basis).T, trans="T").T  # rows of  slope z ≥ height
+            height = G @ (start + basis @ y) - h
+            scale = np.linalg.norm(slope, axis=1)
+            if (height > 1e-12).any():
+                y = y + solve_triangular(R, _least_distance(slope / scale[:, None], height / scale))
+        x = start + basis @ y
+        return x, 0.5 * float(np.sum((F @ x - f) ** 2))
 
-    @staticmethod
-    def _columns(terms: list[tuple[slice, Vector]]) -> dict[int, Vector]:
-        return {block.start: np.atleast_2d(A) for block, A in terms}
+    def _dense(self, terms: Terms) -> Vector:
+        out = np.zeros((len(terms[0][1]), self._size))
+        for block, A in terms:
+            out[:, block] += A
+        return out
 
 
-def _one(block: slice, k: int) -> slice:
-    return slice(block.start + k, block.start + k + 1)
-
-
-def _assemble(columns: dict[int, Vector], n: int) -> sp.csc_matrix:
-    rows = next(iter(columns.values())).shape[0]
-    out = sp.lil_matrix((rows, n))
-    for start, A in columns.items():
-        out[:, start : start + A.shape[1]] = A
-    return out.tocsc()
+def _least_distance(G: Vector, h: Vector) -> Vector:
+    """The shortest z with G z ≥ h."""
+    E = np.vstack([G.T, h])
+    target = np.zeros(len(E))
+    target[-1] = 1.0
+    u, _ = nnls(E, target, maxiter=20 * len(h))
+    residual = E @ u - target
+    if -residual[-1] < 1e-10:
+        raise InfeasibleReference("no point satisfies the constraints")
+    active = u > 0.0
+    # the optimum with this active set, once more from its own equations: rounding of the division is gone
+    return np.linalg.lstsq(G[active], h[active], rcond=None)[0]
