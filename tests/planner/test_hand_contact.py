@@ -1,4 +1,4 @@
-"""The life of a hand contact in every order, against a palm that follows its reference and a surface that may be there."""
+"""The life of a hand contact in every order; the palm follows its reference onto a surface that may be there."""
 
 from __future__ import annotations
 
