@@ -91,7 +91,7 @@ class Session:
         recorder.append_plan(first.report)
 
     def tick(self, plan: Callable[[RobotState], None] | None) -> bool:
-        """One tick of either loop; False: the state is not finite.
+        """One tick of either loop; False: the state is not finite, or MuJoCo has reset itself because it found so.
 
         `plan` is called with the new state before the setpoint is sampled: what it posts may take effect in this tick.
         """
@@ -104,7 +104,8 @@ class Session:
         command = self.tracker.solve(state, setpoint)
         truth = self.plant.step(command.torque)
         self.recorder.append(truth, state, setpoint, command)
-        return bool(np.isfinite(command.torque).all() and np.isfinite(truth.qvel).all())
+        finite = np.isfinite(command.torque).all() and np.isfinite(truth.qvel).all()
+        return bool(finite and self.plant.time > truth.time)  # a reset puts the time back to zero
 
 
 def run_lockstep(

@@ -1,0 +1,141 @@
+"""The lockstep loop: bits, rates, the delay of plans, and the end of a run that went wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from short_run import ROBOT, finished, new_session, short, stand
+
+from wbmpc.loop import Session, initial_posture
+from wbmpc.planner.planner import Planner
+from wbmpc.scenario import build_world, robot_path
+from wbmpc.session import run_scenario
+from wbmpc.signals import RobotState
+
+NOISY = {"duration": 0.25, "sensors__noise_scale": 1.0}
+
+
+def sha(**changes: Any) -> str:
+    return finished(stand(**changes))[1].state_sha256
+
+
+def test_same_seed_gives_the_same_bits_and_another_seed_others() -> None:
+    first = sha(**NOISY, seed=3)
+    assert sha(**NOISY, seed=4) != first
+    finished(short("squat", duration=0.1))  # what ran before in this process leaves no trace
+    assert sha(**NOISY, seed=3) == first
+
+
+def test_seed_drives_the_noise_and_nothing_else() -> None:
+    assert sha(duration=0.1, seed=3) == sha(duration=0.1, seed=4)
+
+
+def test_recording_changes_nothing(tmp_path: Path) -> None:
+    scenario = stand(**NOISY)
+    unrecorded = run_scenario(scenario, name="unrecorded").verdict
+    recorded = run_scenario(scenario, name="recorded", recording=tmp_path / "run.rrd").verdict
+    assert (tmp_path / "run.rrd").stat().st_size > 0
+    assert recorded.state_sha256 == unrecorded.state_sha256
+
+
+class StampingPlanner(Planner):
+    """Writes the time of a plan's snapshot where the tracker carries it along unused: a stance foot's yaw."""
+
+    def solve(self, state: RobotState) -> Any:
+        return replace(super().solve(state), foot_yaw=np.full(2, state.time))
+
+
+@pytest.mark.parametrize(
+    ("planner_rate", "delay"), [(100, 0.01), (100, 0.0), (125, 0.003), (40, 0.025), (200, 0.017), (1000, 0.002)]
+)
+def test_a_plan_takes_effect_after_its_delay_and_not_before(
+    monkeypatch: pytest.MonkeyPatch, planner_rate: int, delay: float
+) -> None:
+    monkeypatch.setattr("wbmpc.loop.Planner", StampingPlanner)
+    timing, recorder = finished(stand(duration=0.06, loop__planner_rate=planner_rate, loop__planner_delay=delay))
+    for tick, used in enumerate(recorder.setpoint_foot_yaw[:, 0]):
+        # in whole milliseconds: the newest snapshot that is at least `delay` old; the first plan is there at once
+        snapshots = range(0, tick + 1, 1000 // planner_rate)
+        ready = [s for s in snapshots if s + round(1000 * delay) <= tick]
+        assert used == pytest.approx(1e-3 * max(ready, default=0), abs=1e-9), tick
+    assert recorder.ticks == 60
+    assert len(recorder.plans) == 1 + 59 * planner_rate // 1000
+    assert timing.plan_latency == [delay] * (len(recorder.plans) - 1)
+    assert timing.missed_deadlines == timing.late_plans == 0
+
+
+def test_other_physics_rates_work() -> None:
+    timing, recorder = finished(stand(duration=0.2, loop__physics_rate=500, loop__planner_rate=50, recording__rate=50))
+    assert recorder.ticks == 100
+    np.testing.assert_allclose(np.diff(recorder.time), 0.002, atol=1e-12)
+    assert timing.simulated_time == pytest.approx(0.2)
+    assert recorder.torso_up.min() > 0.999
+
+
+def break_at(monkeypatch: pytest.MonkeyPatch, tick: int, velocity: float) -> None:
+    """Give one joint this velocity [rad/s] in the plant at one tick."""
+    tick_once, count = Session.tick, 0
+
+    def broken(session: Session, plan: Any) -> bool:
+        nonlocal count
+        if count == tick:
+            session.plant.data.qvel[8] = velocity
+        count += 1
+        return tick_once(session, plan)
+
+    monkeypatch.setattr(Session, "tick", broken)
+
+
+@pytest.mark.parametrize("velocity", [np.nan, np.inf, 1e11])
+def test_a_state_that_is_not_finite_ends_the_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, velocity: float
+) -> None:
+    """1e11 is finite, but MuJoCo resets the robot to its initial posture for it: that must not pass for standing."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its warning to a file in the working directory
+    break_at(monkeypatch, 30, velocity)
+    with np.errstate(all="ignore"):
+        timing, recorder = finished(stand(duration=0.1))
+    assert recorder.ticks == 31
+    assert "not finite" in recorder.events[-1].text
+
+
+def test_a_torque_that_is_not_finite_ends_the_run(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.chdir(tmp_path)
+    scenario = stand(duration=0.1)
+    session, recorder = new_session(scenario)
+    solve = session.tracker.solve
+
+    def broken(state: RobotState, setpoint: Any) -> Any:
+        command = solve(state, setpoint)
+        return replace(command, torque=command.torque * np.nan) if recorder.ticks == 5 else command
+
+    monkeypatch.setattr(session.tracker, "solve", broken)
+    assert [session.tick(None) for _ in range(6)] == [True] * 5 + [False]
+
+
+def test_sink_and_progress_follow_the_run() -> None:
+    flushed: list[float] = []
+    progress: list[float] = []
+
+    class Sink:
+        def flush(self, now: float) -> None:
+            flushed.append(now)
+
+    finished(stand(duration=1.1), sink=Sink(), on_progress=progress.append)
+    assert flushed == progress == pytest.approx([0.5, 1.0])
+
+
+def test_initial_posture_has_its_joints_and_its_soles_on_the_floor() -> None:
+    scenario = stand(initial__joints={"left_knee": 0.9, "right_knee": 0.9})
+    model = build_world(scenario, robot_path(scenario))
+    qpos = initial_posture(scenario, ROBOT, model)
+    home = model.key("home").qpos
+    changed = {ROBOT.joint_names[j] for j in np.flatnonzero(qpos[7:] != home[7:])}
+    assert changed <= {"left_knee", "right_knee"}
+    assert qpos[7 + ROBOT.joint_index("left_knee")] == 0.9
+    session, _ = new_session(scenario)
+    assert session.plant.data.site("left_sole").xpos[2] == pytest.approx(0.0, abs=1e-12)

@@ -1,0 +1,201 @@
+"""The real-time loop: scheduling against a made-up clock, the planner's thread, and a replay in lockstep."""
+
+from __future__ import annotations
+
+import gc
+import sys
+from collections.abc import Callable
+from threading import Event, Semaphore, active_count
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from short_run import ROBOT, finished, new_recorder, new_session, stand
+
+from wbmpc import realtime
+from wbmpc.mailbox import Mailbox
+from wbmpc.planner.planner import Planner
+from wbmpc.realtime import PlannerThread, run_realtime
+from wbmpc.signals import RobotState
+
+STAND = stand()
+
+
+def test_a_standing_robot_in_real_time() -> None:
+    scenario = stand(duration=0.5)
+    threads, progress = active_count(), []
+    timing, recorder = finished(scenario, run=run_realtime, on_progress=progress.append)
+    assert recorder.ticks == 500
+    np.testing.assert_allclose(np.diff(recorder.time), 1e-3, atol=1e-12)  # no tick is skipped, however late
+    assert recorder.torso_up.min() > 0.999
+    assert timing.wall_time > 0.498
+    assert timing.drift == pytest.approx(timing.wall_time - 0.5)
+    assert 0 <= timing.missed_deadlines <= 500
+    assert progress == pytest.approx([0.5])
+    # 49 snapshots are due; each is planned, skipped, or still in work at the end
+    planned = len(recorder.plans) - 1
+    assert 1 <= planned <= 49
+    assert 47 <= planned + timing.skipped_plans <= 49
+    latency = np.array(timing.plan_latency)
+    assert len(latency) == planned
+    assert latency.min() > 0.0
+    assert timing.late_plans == np.sum(latency > 0.0105)
+    assert active_count() == threads
+
+
+def test_replay_in_lockstep_repeats_the_bits() -> None:
+    """What makes a threaded run unrepeatable is when its plans are ready: charge that, and nothing else is left."""
+    scenario = stand(duration=0.3, sensors__noise_scale=1.0, seed=5)
+    timing, recorder = finished(scenario, run=run_realtime)
+    ready = {
+        round(1e3 * plan.time): latency for plan, latency in zip(recorder.plans[1:], timing.plan_latency, strict=True)
+    }
+    assert ready
+
+    session, replayed = new_session(scenario)
+
+    def plan(state: RobotState) -> None:
+        session.mailbox.post(session.planner.solve(state), available_at=state.time + ready[round(1e3 * state.time)])
+
+    for tick in range(session.ticks):
+        session.tick(plan if tick in ready else None)
+    assert replayed.state_sha256 == recorder.state_sha256
+
+
+def test_an_error_of_the_planner_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve, calls = Planner.solve, 0
+
+    def failing(planner: Planner, state: RobotState) -> Any:
+        nonlocal calls
+        calls += state.time > 0.0
+        if calls == 3:
+            raise ZeroDivisionError("the third plan")
+        return solve(planner, state)
+
+    monkeypatch.setattr(Planner, "solve", failing)
+    threads, interval = active_count(), sys.getswitchinterval()
+    recorder = new_recorder(scenario := stand(duration=2.0))
+    with pytest.raises(ZeroDivisionError, match="the third plan"):
+        run_realtime(scenario, robot=ROBOT, recorder=recorder)
+    assert recorder.ticks < 1000  # at once, not at the end
+    assert active_count() == threads
+    assert gc.isenabled()
+    assert sys.getswitchinterval() == interval
+
+
+class Clock:
+    """Time passes when somebody sleeps, looks at the clock, or makes a tick."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def perf_counter(self) -> float:
+        self.now += 1e-6
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        assert seconds >= 0.0
+        self.now += seconds
+
+
+def run_with_tick_times(durations: list[float]) -> tuple[Any, list[float]]:
+    """A real-time run on a made-up clock whose ticks take the given times [s]; the begin of each tick [s]."""
+    clock, begins = Clock(), []
+
+    class FakeSession:
+        step, ticks = 1e-3, len(durations)
+        planner = None
+
+        def __init__(self, *args: Any, **kwargs: Any) -> None:
+            self.mailbox = Mailbox()
+            self.plant = SimpleNamespace(time=0.0)
+
+        def tick(self, plan: Callable[[RobotState], None] | None) -> bool:
+            begins.append(clock.now - 100.0)
+            clock.now += durations[len(begins) - 1]
+            self.plant.time += 1e-3
+            return True
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(realtime, "Session", FakeSession)
+        patch.setattr(realtime, "_warm_up", lambda *args: None)
+        patch.setattr(realtime, "perf_counter", clock.perf_counter)
+        patch.setattr(realtime, "sleep", clock.sleep)
+        timing = run_realtime(STAND, robot=ROBOT, recorder=None, model=object())  # type: ignore[arg-type]
+    return timing, begins
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.sampled_from([2e-4, 8e-4, 1.7e-3, 4.3e-3]), min_size=1, max_size=40))
+def test_ticks_begin_at_their_slot_or_as_soon_as_the_last_one_ends(durations: list[float]) -> None:
+    timing, begins = run_with_tick_times(durations)
+    free, expected = 0.0, []
+    for k, duration in enumerate(durations):
+        expected.append(max(1e-3 * k, free))
+        free = expected[-1] + duration
+    np.testing.assert_allclose(begins, expected, atol=2e-4)
+    late = np.array(expected) - 1e-3 * np.arange(len(durations))
+    assert timing.missed_deadlines == np.sum(late > 1e-3)
+    assert timing.wall_time == pytest.approx(free, abs=2e-4)
+
+
+class GatedPlanner:
+    """Starts a plan when asked, ends it when let."""
+
+    def __init__(self) -> None:
+        self.solved: list[float] = []
+        self.started, self.gate, self.ended = Event(), Event(), Semaphore(0)
+
+    def solve(self, state: Any) -> Any:
+        self.started.set()
+        assert self.gate.wait(5.0)
+        self.solved.append(state.time)
+        self.ended.release()
+        return state
+
+
+def test_the_planner_takes_the_newest_snapshot_and_leaves_out_older_ones() -> None:
+    planner, mailbox = GatedPlanner(), Mailbox()
+    with PlannerThread(planner, mailbox) as worker:  # type: ignore[arg-type]
+        worker.request(SimpleNamespace(time=1.0))
+        assert planner.started.wait(5.0)
+        for time in (2.0, 3.0, 4.0):  # none of these waits for the planner
+            worker.request(SimpleNamespace(time=time))
+        assert mailbox.latest(9.0) is None
+        planner.gate.set()
+        assert all(planner.ended.acquire(timeout=5.0) for _ in range(2))
+    assert planner.solved == [1.0, 4.0]
+    assert mailbox.latest(9.0).time == 4.0  # type: ignore[union-attr]
+    assert worker.skipped == 2
+
+
+def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The planner waits, so that the machine has nothing else to do: then ticks go on and plans come late."""
+    solve, sleep = Planner.solve, realtime.sleep
+
+    def slow(planner: Planner, state: RobotState) -> Any:
+        if state.time > 0.0:
+            sleep(0.035)
+        return solve(planner, state)
+
+    monkeypatch.setattr(Planner, "solve", slow)
+    timing, recorder = finished(stand(duration=0.4), run=run_realtime)
+    assert recorder.ticks == 400
+    assert timing.skipped_plans >= 1
+    assert timing.late_plans >= 1
+    assert timing.wall_time < 0.4 + 0.035 * len(recorder.plans)  # had it waited for every plan
+
+
+def test_mailbox_gives_each_plan_once_and_never_early() -> None:
+    mailbox: Any = Mailbox()
+    for name, ready in (("a", 0.0), ("b", 0.010), ("c", 0.012)):
+        mailbox.post(name, available_at=ready)
+    assert mailbox.arrived(0.0) == ["a"]
+    assert mailbox.arrived(0.009) == []
+    assert mailbox.latest(0.009) == "a"
+    assert mailbox.arrived(0.020) == ["b", "c"]
+    assert mailbox.latest(0.020) == "c"
+    assert mailbox.arrived(0.030) == []
