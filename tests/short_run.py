@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import mujoco
+
 from wbmpc.loop import LoopTiming, Session, run_lockstep
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
@@ -54,4 +56,5 @@ def new_plant(scenario: Scenario, *, seed: int = 0, height: float = 0.0, velocit
         model, ROBOT, disturbances=scenario.disturbances, sensors=scenario.sensors, qpos=qpos, seed=seed
     )  # fmt: skip
     plant.data.qvel[:] = velocity
+    mujoco.mj_step1(model, plant.data)  # what depends on the velocity, as after a step
     return plant

@@ -98,7 +98,7 @@ def test_a_state_that_is_not_finite_ends_the_run(
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warning to a file in the working directory
     break_at(monkeypatch, 30, velocity)
     with np.errstate(all="ignore"):
-        timing, recorder = finished(stand(duration=0.1))
+        _, recorder = finished(stand(duration=0.1))
     assert recorder.ticks == 31
     assert "not finite" in recorder.events[-1].text
 
