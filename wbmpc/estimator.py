@@ -84,7 +84,7 @@ class Estimator:
         if weight_sum > 0.0:
             self._position += self.POSITION_GAIN * (position / weight_sum - self._position)
 
-        vertical = weight_sum + float(measurement.palm_force_in_world[:, 2].sum())
+        vertical = float(force[:, 2].sum() + measurement.palm_force_in_world[:, 2].sum())
         if weight_sum > 0.0:
             scale = min(max(vertical / (robot.mass * GRAVITY), 0.5), 1.5)
             self._mass_scale += step / self.MASS_TIME * (scale - self._mass_scale)

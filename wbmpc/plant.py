@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from wbmpc.robot import Robot
 from wbmpc.scenario import Disturbance, SensorSettings
@@ -14,7 +15,7 @@ class Plant:
     """One physics step at a time: `measure`, then `step` with the torques for the coming step.
 
     Between two steps everything that depends on position and velocity is up to date (`mj_step1`), so a measurement
-    belongs to one instant. `truth` describes the step that `step` just made: the state at its start, the forces during it.
+    belongs to one instant. `step` returns the truth of the step it made: the state at its start, the forces during it.
     """
 
     def __init__(
@@ -142,7 +143,7 @@ class Plant:
                 total += now
         return total
 
-    def _contacts(self, sole: Vector) -> tuple[int, Vector, Vector, Vector, Vector]:
+    def _contacts(self, sole: Vector) -> tuple[int, NDArray[np.int64], Vector, Vector, Vector]:
         """Contacts of the step just made, forces on the robot; also the wrenches the force sensors see."""
         d = self.data
         contact, count = d.contact, d.ncon

@@ -32,7 +32,7 @@ class Candidate:
 
 
 class Candidates:
-    """Keeps each candidate's posture current, a few iterations a plan in turn, and runs stage 3 over the reachable ones.
+    """Keeps the candidates' postures current, one a plan in turn, and runs stage 3 over the reachable ones.
 
     A candidate is reachable when a posture exists that has its palm on the patch and the CoM over the feet: the contact
     must be made before it can help.
@@ -53,7 +53,7 @@ class Candidates:
         self._slots = slots
 
     def refresh(self, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int, everyone: bool = False) -> None:
-        """Improve the posture of the next candidate in turn (or of everyone) for feet at `soles` (2, 3), `yaws` (2,)."""
+        """Improve the posture of the next candidate in turn, or of everyone, for feet at `soles` (2, 3), `yaws` (2,)."""
         if not self.all:
             return
         turn = self.all if everyone else [self.all[self._turn % len(self.all)]]

@@ -139,7 +139,7 @@ class ContactChoice:
         qp.gradient[:] = 0.0
         qp.x_lower[:forces], qp.x_upper[:forces] = -np.inf, np.inf
         qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
-        # a small curvature everywhere: solvers want strict convexity, unused slots and binaries have no cost of their own
+        # solvers want strict convexity; unused slots and binaries have no curvature of their own
         qp.hessian[:] = 1e-6 * np.eye(forces + slots)
         h, q = shift_bound(need), polygon_bound(need)
         for knot in range(self.KNOTS):
@@ -189,8 +189,8 @@ class ContactChoice:
 class ContactForce:
     """The forces of the chosen contacts at every knot: stage 3 with H fixed.
 
-    The same objective and constraints as `ContactChoice`, plus a cap per knot that ramps a new contact in and an old one
-    out; over `contacts` hands at once. Polygon rows are soft here: while a cap ramps, the wanted shift may not be there.
+    The same objective and constraints as `ContactChoice`, plus a cap per knot that ramps a new contact in and an old
+    one out; over `contacts` hands at once. Polygon rows are soft: while a cap ramps, the shift may not be there.
     """
 
     def __init__(self, steps: int, settings: ContactSettings, *, mass: float, contacts: int, backend: str) -> None:
@@ -219,19 +219,21 @@ class ContactForce:
             caps: (contacts, steps) bound on each normal force at each knot [N]; 0 where the contact is not there yet.
         """
         qp, n, width = self.problem, self._steps, self._width
-        rows = qp.matrix.reshape(n, self._rows_per_knot, n, width)[self._knots, :, self._knots]  # diagonal blocks, a copy
+        rows = qp.matrix.reshape(n, self._rows_per_knot, n, width)[
+            self._knots, :, self._knots
+        ]  # diagonal blocks, a copy
         lower, upper = qp.lower.reshape(n, -1), qp.upper.reshape(n, -1)
         x_lower, x_upper = qp.x_lower.reshape(n, width), qp.x_upper.reshape(n, width)
         rows[:] = 0.0
         shift, polygon = slice(0, 2), slice(2, 2 + MAX_EDGES)
         h, q = shift_bound(need), polygon_bound(need)
-        used = (caps > 0.0).any(axis=0)[:, None]
+        used = np.any(caps > 0.0, axis=0)[:, None]
         lower[:, shift], upper[:, shift] = np.where(used, h, -np.inf), np.where(used, h, np.inf)
         upper[:, polygon] = np.where(used, q, np.inf)
         for slot, patch in enumerate(patches):
             columns = slice(3 * slot, 3 * slot + 3)
             cone = slice(2 + MAX_EDGES + 5 * slot, 7 + MAX_EDGES + 5 * slot)
-            free = (caps[slot] > 0.0)[:, None] if patch is not None else np.zeros((n, 1), dtype=bool)
+            free = np.reshape((caps[slot] > 0.0) & (patch is not None), (n, 1))
             x_lower[:, columns], x_upper[:, columns] = np.where(free, -np.inf, 0.0), np.where(free, np.inf, 0.0)
             if patch is None or not free.any():
                 continue

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-
 from wbmpc.planner.hand_path import HandPath
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.scenario import PatchPose
@@ -77,7 +76,8 @@ class HandContact:
         zero = np.zeros(3)
         if self.touching:
             return self._touched, zero, zero
-        assert self._path is not None and self.patch is not None
+        assert self._path is not None
+        assert self.patch is not None
         if self._descent >= 0.0:
             settings = self._settings
             moving = self._descent < settings.approach_clearance + settings.search_depth
@@ -185,7 +185,8 @@ class HandContact:
 
     def _approach(self, dt: float, *, palm: Vector, normal_force: float, needed: bool, home: Vector) -> str | None:
         settings = self._settings
-        assert self.patch is not None and self._path is not None
+        assert self.patch is not None
+        assert self._path is not None
         if not needed and self._clock > 0.5:
             self.release(palm=palm, home=home)
             return None

@@ -8,8 +8,8 @@ from wbmpc.kinematics import Kinematics
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.whole_body import VelocityTasks
 from wbmpc.robot import Robot
-from wbmpc.signals import SIDES, HandMode, Vector
 from wbmpc.rotations import level_frame, rotation_error
+from wbmpc.signals import SIDES, HandMode, Vector
 
 LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
 SPEED_SHARE = 0.6  # of the servo's no-load speed that a plan may use
@@ -25,7 +25,6 @@ class JointReference:
     def __init__(self, robot: Robot, settings: WholeBodySettings, *, q: Vector) -> None:
         self._robot, self._settings = robot, settings
         self._kinematics = Kinematics(robot)
-        self.start = q.copy()  # (nq,) nominal posture
         self.q = q.copy()  # (nq,)
         self._kinematics.update_kinematics(self.q)
 
@@ -62,7 +61,7 @@ class JointReference:
         vertical_velocity: float,
         soles: Vector,
         yaws: Vector,
-        hands: list[tuple[Vector, Vector, Vector, HandMode]],
+        hands: list[tuple[Vector, Vector, HandMode]],
         posture: Vector,
     ) -> VelocityTasks:
         """Stage 2's velocity tasks at the reference.
@@ -71,7 +70,7 @@ class JointReference:
             com: planned CoM (3,) now [m].
             vertical_velocity: stage 1's ċ_z [m/s].
             soles, yaws: where the stance feet are, (2, 3) [m] and (2,) [rad].
-            hands: position, velocity, acceleration (3,) and mode of each hand.
+            hands: position [m], velocity [m/s] (3,) and mode of each hand.
             posture: (nj,) joint angles to be drawn to [rad].
         """
         robot, settings, kinematics, nv = self._robot, self._settings, self._kinematics, self._robot.nv
@@ -91,7 +90,7 @@ class JointReference:
             )
             frame = robot.palm_frames[side]
             hand_jacobian[3 * side : 3 * side + 3] = kinematics.jacobian(frame)[:3]
-            position, velocity, _, mode = hands[side]
+            position, velocity, mode = hands[side]
             if mode != HandMode.FREE:
                 active[side] = 1.0
                 pull = rate * (position - kinematics.position(frame))

@@ -44,7 +44,7 @@ class Plan:
     report: PlanReport
 
     def com_state(self, time: float) -> Vector:
-        """CoM state (3 axes, 3) = c, ċ, c̈ at `time` [m, m/s, m/s²]; the last knot's velocity goes on after the horizon."""
+        """CoM state (3 axes, 3) = c, ċ, c̈ at `time` [m, m/s, m/s²]; it stays at the last knot after the horizon."""
         elapsed = max(time - self.time, 0.0)
         knot = min(int(elapsed / self.step + 1e-9), len(self.com_jerk) - 1)
         t = min(elapsed - knot * self.step, self.step)

@@ -6,17 +6,19 @@ import numpy as np
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.robot import Robot
-from wbmpc.signals import Vector
 from wbmpc.rotations import level_frame, rotation_error
+from wbmpc.signals import Vector
 
-SOLE_COST, PALM_COST, COM_COST, POSTURE_COST = 1e4, 1e3, 2.0, 2e-3
+SOLE_COST, PALM_COST, COM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 2.0, 3.0, 2e-3
 DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
+CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
 class Posture:
-    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 2 |c_xy − support centre|² + 2e-3 |posture error|².
+    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 2 |c_xy − centre|² + 3 (c_z − nominal)²
+    + 2e-3 |posture error|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
     the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
@@ -27,14 +29,17 @@ class Posture:
         """`nominal` (nq,) is the posture to deviate from as little as possible, and the start."""
         self._robot, self._nominal = robot, nominal
         self._kinematics = Kinematics(robot)
+        self._kinematics.update_kinematics(nominal)
+        self._height = float(self._kinematics.com[2])
         self._lower, self._upper = robot.joint_lower + JOINT_MARGIN, robot.joint_upper - JOINT_MARGIN
         self.q = nominal.copy()  # (nq,)
         self.com = np.zeros(3)  # [m] of the last iterate
         self.residual = np.inf  # [m] largest palm error of the last iterate
+        self._reached: tuple[bool, ...] = ()  # which palms had a target
+        self._targets: tuple[bytes, ...] = ()
+        self._step = np.inf  # [rad, m] largest change of the last iteration
 
-    def iterate(
-        self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector
-    ) -> None:
+    def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector) -> None:
         """Run `count` iterations.
 
         Args:
@@ -44,7 +49,15 @@ class Posture:
             centre: (2,) where the CoM should rather be [m].
         """
         robot, kinematics, nv = self._robot, self._kinematics, self._robot.nv
+        reached = tuple(p is not None for p in palms)
+        if reached != self._reached:  # other hands: from the start, a neighbouring optimum can be a contorted one
+            self.q, self._reached = self._nominal.copy(), reached
+        targets = (soles.tobytes(), yaws.tobytes(), centre.tobytes(), *(p.tobytes() for p in palms if p is not None))
+        if targets != self._targets:
+            self._targets, self._step = targets, np.inf
         for _ in range(count):
+            if self._step < CONVERGED:
+                return
             kinematics.update_kinematics(self.q)
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
@@ -74,11 +87,14 @@ class Posture:
             J = kinematics.com_jacobian[:2]
             H += COM_COST * (J.T @ J)
             g += COM_COST * (J.T @ (centre - self.com[:2]))
+            J = kinematics.com_jacobian[2]
+            H += HEIGHT_COST * np.outer(J, J)
+            g += HEIGHT_COST * (self._height - self.com[2]) * J
             diagonal = H.reshape(-1)[:: nv + 1]
             diagonal[6:] += POSTURE_COST
             g[6:] += POSTURE_COST * (self._nominal[7:] - self.q[7:])
             diagonal += DAMPING
-            delta = np.linalg.solve(H, g)
+            delta = np.asarray(np.linalg.solve(H, g), dtype=np.float64)
             # joints that would leave their range are fixed at it, once, and the rest solved again
             wanted = self.q[7:] + delta[6:]
             outside = np.flatnonzero((wanted < self._lower) | (wanted > self._upper)) + 6
@@ -91,3 +107,4 @@ class Posture:
             np.clip(delta, -STEP_LIMIT, STEP_LIMIT, out=delta)
             self.q = robot.integrate(self.q, delta)
             np.clip(self.q[7:], self._lower, self._upper, out=self.q[7:])
+            self._step = float(np.abs(delta).max())

@@ -25,8 +25,8 @@ class Preview:
             raise ValueError(f"a preview needs steps >= 1 and step > 0, received {steps} and {step}")
         self.steps = steps
         self.step = step  # [s]
-        time = step * np.arange(1, steps + 1)
-        self.times = time  # (N,) [s]
+        time = step * np.arange(1.0, steps + 1.0)
+        self.times: Vector = time  # (N,) [s]
         self.P_ps = np.column_stack([np.ones(steps), time, time**2 / 2])  # (N, 3)
         self.P_vs = np.column_stack([np.zeros(steps), np.ones(steps), time])
         self.P_as = np.column_stack([np.zeros(steps), np.zeros(steps), np.ones(steps)])

@@ -34,7 +34,9 @@ def sole_wrench_rows(*, half_extents: Vector, friction: float, yaw_radius: float
 def pressure_rows(half_extents: Vector) -> Vector:
     """Rows (4, 6) of P w ≤ 0: the centre of pressure of a sole's wrench lies within ± half_extents (2,) [m]."""
     length, width = half_extents
-    return np.array([[0, 0, -reach, *(sign * np.eye(3)[axis])] for axis, reach in ((0, width), (1, length)) for sign in (1, -1)])
+    return np.array(
+        [[0, 0, -reach, *(sign * np.eye(3)[axis])] for axis, reach in ((0, width), (1, length)) for sign in (1, -1)]
+    )
 
 
 def palm_force_rows(friction: float) -> Vector:
