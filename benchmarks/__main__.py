@@ -67,7 +67,7 @@ def report_run(console: Console, name: str) -> None:
     bare = run_scenario(load_scenario(path), name=name)
 
     recorder, flushes = result.recorder, parts[-1]
-    table = Table(title=f"{name}: wall times [ms]", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table = Table(title=f"{name}: wall times in ms", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("", no_wrap=True)
     for header in ("p50", "p99", "max", "calls"):
         table.add_column(header, justify="right")
@@ -101,7 +101,7 @@ def report_backends(console: Console) -> None:
         box=box.SIMPLE_HEAD,
         pad_edge=False,
     )
-    for header in ("problem", "variables × rows", "daqp [ms]", *native, "highs (MIQP)"):
+    for header in ("problem", "variables × rows", "daqp, ms", *native, "highs (MIQP)"):
         left = header == "problem"
         table.add_column(header.replace(":", ":\n"), justify="left" if left else "right", no_wrap=left)
     for path in sorted((ROOT / "tests" / "qp" / "instances").glob("*.npz")):
