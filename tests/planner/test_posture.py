@@ -1,0 +1,106 @@
+"""The posture's inverse kinematics against forward kinematics of random postures, and where nothing can be reached."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from robots import at, palms, soles, surena
+
+from wbmpc.planner.posture import JOINT_MARGIN, Posture
+from wbmpc.rotations import level_frame
+from wbmpc.signals import Vector
+
+ROBOT = surena()
+HOME = ROBOT.home_q
+SOLES, YAWS, CENTRE = soles(HOME), np.zeros(2), np.zeros(2)
+LOWER, UPPER = ROBOT.joint_lower + JOINT_MARGIN, ROBOT.joint_upper - JOINT_MARGIN
+
+
+def reached(targets: list[Vector | None], iterations: int = 60) -> Posture:
+    posture = Posture(ROBOT, nominal=HOME)
+    posture.iterate(iterations, soles=SOLES, yaws=YAWS, palms=targets, centre=CENTRE)
+    return posture
+
+
+def standing_posture(seed: int) -> Vector:
+    """A random posture that keeps the soles where they are: the joints above the hips move."""
+    rng = np.random.default_rng(seed)
+    q = HOME.copy()
+    legs = np.concatenate(ROBOT.leg_joints)
+    above = np.setdiff1d(np.arange(ROBOT.nj), legs)
+    middle, half = 0.5 * (LOWER + UPPER), 0.5 * (UPPER - LOWER)
+    # around home, within the range: arms through the body would be reachable here and nowhere else
+    away = q[7:] + rng.uniform(-0.7, 0.7, ROBOT.nj)
+    q[7:][above] = np.clip(away, middle - 0.9 * half, middle + 0.9 * half)[above]
+    return q
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_places_of_real_postures_are_reached(seed: int) -> None:
+    wanted = palms(standing_posture(seed))
+    posture = reached([wanted[0], wanted[1]])
+    assert posture.residual < 2e-3  # [m] what the pulls to the middle and to the nominal posture leave
+    assert_allclose(palms(posture.q), wanted, atol=2e-3)
+    assert_allclose(soles(posture.q), SOLES, atol=1e-3)
+    kinematics = at(posture.q)
+    for frame in ROBOT.sole_frames:
+        assert_allclose(kinematics.rotation(frame), level_frame(0.0), atol=5e-3)
+
+
+@settings(max_examples=10, deadline=None)
+@given(x=st.floats(-0.6, 0.8), y=st.floats(-0.6, 0.6), z=st.floats(0.0, 0.8))
+def test_joint_limits_hold_wherever_it_is_asked_to_go(x: float, y: float, z: float) -> None:
+    posture = reached([np.array([x, y, z]), None], iterations=30)
+    assert (posture.q[7:] >= LOWER - 1e-12).all()
+    assert (posture.q[7:] <= UPPER + 1e-12).all()
+    assert np.isfinite(posture.residual)
+    assert np.linalg.norm(posture.q[3:7]) == pytest.approx(1.0)
+
+
+def test_residual_and_com_are_those_of_a_fixed_point() -> None:
+    """Converged, the numbers handed out are those of `q` itself, from Pinocchio's forward kinematics."""
+    target = np.array([0.30, 0.08, 0.25])
+    posture = reached([target, None], iterations=100)
+    assert posture.residual == pytest.approx(np.linalg.norm(palms(posture.q)[0] - target), abs=1e-4)
+    assert_allclose(posture.com, at(posture.q).com, atol=1e-4)
+
+
+@settings(max_examples=8, deadline=None)
+@given(distance=st.floats(0.75, 1.2), side=st.floats(-0.3, 0.3), up=st.floats(0.0, 0.6))
+def test_a_place_beyond_all_links_is_never_called_reachable(distance: float, side: float, up: float) -> None:
+    """The residual is at least the distance from the sole less the stretched links; how much more is not promised."""
+    direction = np.array([0.8, side, up]) / np.linalg.norm([0.8, side, up])
+    kinematics = at(HOME)
+    hip = kinematics.position(ROBOT.torso_frame) - SOLES[0]
+    shoulder = kinematics.position(ROBOT.shoulder_frames[0]) - kinematics.position(ROBOT.torso_frame)
+    stretched = ROBOT.arm_length + np.linalg.norm(shoulder) + np.linalg.norm(hip) + 0.03  # knees straight
+    residual = reached([SOLES[0] + distance * direction, None], iterations=80).residual
+    assert residual > max(distance - stretched - 0.04, 0.05)  # 0.04: the soles give way a little
+
+
+def test_unreachable_places_are_told_in_the_order_of_their_distance() -> None:
+    near, far, farther = (reached([np.array([x, 0.05, 0.30]), None]).residual for x in (0.40, 0.70, 0.90))
+    assert near < 0.003
+    assert 0.03 < far < farther
+
+
+def test_a_free_hand_has_no_residual() -> None:
+    assert reached([None, None]).residual == 0.0
+
+
+def test_the_posture_shifts_the_com_no_more_than_it_must() -> None:
+    """A near place leaves the CoM over the middle, a far one brings it forward: d of the paper depends on it."""
+    near, far = reached([np.array([0.15, 0.12, 0.25]), None]), reached([np.array([0.42, 0.05, 0.30]), None])
+    assert np.linalg.norm(near.com[:2] - CENTRE) < 0.015
+    assert far.com[0] > near.com[0] + 0.03
+
+
+def test_mirrored_targets_give_mirrored_postures() -> None:
+    left = reached([np.array([0.40, 0.06, 0.28]), None])
+    right = reached([None, np.array([0.40, -0.06, 0.28])])
+    assert_allclose(left.com * [1, -1, 1], right.com, atol=1e-5)
+    assert left.residual == pytest.approx(right.residual, abs=1e-6)
