@@ -154,6 +154,7 @@ class Steps:
                 elif p > 0 or side == LEFT:
                     amount -= smooth((tick - p * PHASE) / PHASE)  # the stance leg goes back under the body
             angles += leg(side, amount)
+        angles[ROBOT.joint_index("waist_yaw")] += 0.3 * smooth(tick / 300) * np.sin(2 * np.pi * tick / 700)
         return angles
 
     def stance(self, tick: float) -> tuple[int, pin.SE3]:
@@ -194,12 +195,19 @@ def walk(steps: Steps, phases: int, seen: Callable[[int, RobotState], None]) -> 
 
 
 def test_a_foot_is_anchored_anew_where_it_touches_down() -> None:
-    """Four steps: an old anchor would pull the base back by a whole step at every touch-down."""
+    """Four steps: an old anchor would pull the base back by a whole step at every touch-down.
+
+    The waist turns all the while, and the IMU above it with it: the base's own velocity must not.
+    """
     steps, errors, path = Steps(4), [], []
 
     def seen(tick: int, state: RobotState) -> None:
-        errors.append(state.q[:3] - steps.base(tick).translation)
-        path.append(steps.base(tick).translation)
+        before, here, after = (steps.base(t, tick) for t in (tick - 0.5, tick, tick + 0.5))
+        errors.append(state.q[:3] - here.translation)
+        path.append(here.translation)
+        linear = here.rotation.T @ (after.translation - before.translation) / STEP
+        assert_allclose(state.v[:3], linear, atol=0.02)
+        assert_allclose(state.v[3:6], pin.log3(before.rotation.T @ after.rotation) / STEP, atol=0.1)
 
     walk(steps, 4, seen)
     left = relative(steps.joints(0), ROBOT.sole_frames[LEFT]).translation
@@ -207,6 +215,40 @@ def test_a_foot_is_anchored_anew_where_it_touches_down() -> None:
     assert np.linalg.norm(swung - left) > 0.02  # the foot does come down elsewhere
     assert np.ptp([p[0] for p in path]) > 0.02  # and the base does travel
     assert np.abs(errors).max() < 1.5e-3
+
+
+@pytest.mark.parametrize(("side", "edge"), [(LEFT, 0.05), (RIGHT, -0.05)])
+def test_velocity_of_a_foot_that_rolls_over_its_edge(side: int, edge: float) -> None:
+    """The stiff robot tips about a line under one sole: all its weight is there, and only that line stands still."""
+    joints, rate = ROBOT.home_q[7:], 0.8  # [rad/s]
+    base = pin.SE3(np.eye(3), ROBOT.home_q[:3].copy())
+    axis = (base * relative(joints, ROBOT.sole_frames[side])).translation + np.array([edge, 0.0, 0.0])
+    imu = relative(joints, ROBOT.imu_frame)
+    estimator = Estimator(ROBOT, q=ROBOT.home_q.copy(), step=STEP)
+    omega = np.array([0.0, rate, 0.0])
+    for tick in range(150):
+        tipped = pin.SE3(pin.exp3(omega * tick * STEP), axis) * pin.SE3(np.eye(3), -axis) * base
+        pose = tipped * imu
+        centripetal = np.cross(omega, np.cross(omega, pose.translation - axis))
+        x, y, z, w = pin.Quaternion(pose.rotation).coeffs()
+        wrench = np.zeros((2, 6))
+        sole = (tipped * relative(joints, ROBOT.sole_frames[side])).translation
+        wrench[side, 2], wrench[side, 4] = WEIGHT, -(axis - sole)[0] * WEIGHT  # m_y = -x f_z
+        state = estimator.update(
+            Measurement(
+                time=tick * STEP,
+                joint_position=joints,
+                joint_velocity=np.zeros(ROBOT.nj),
+                imu_quaternion=np.array([w, x, y, z]),
+                imu_gyro=pose.rotation.T @ omega,
+                imu_accelerometer=pose.rotation.T @ (centripetal + np.array([0.0, 0.0, GRAVITY])),
+                sole_wrench_in_world=wrench,
+                palm_force_in_world=np.zeros((2, 3)),
+            )
+        )
+    velocity = np.cross(omega, tipped.translation - axis)
+    assert np.linalg.norm(velocity) > 0.1
+    assert_allclose(tipped.rotation @ state.v[:3], velocity, atol=0.01)
 
 
 def test_signals_do_not_change_after_they_were_handed_out() -> None:

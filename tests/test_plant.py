@@ -47,10 +47,24 @@ def contact_wrench(plant: Plant, geom: int, point: Vector) -> Vector:
     return total
 
 
-def test_momentum_balances_with_the_contact_forces() -> None:
+def table_under_the_right_palm() -> dict[str, Any]:
+    """A palm is a sphere, the table a box: MuJoCo lists the robot first here, and second on the floor."""
+    kinematics = Kinematics(ROBOT)
+    kinematics.update_kinematics(ROBOT.home_q)
+    x, y, z = kinematics.position(ROBOT.palm_frames[1])
+    top = z - ROBOT.palm_radius
+    return {"table": {"kind": "box", "size": [0.06, 0.06, 0.04], "position": [x, y], "bottom": top - 0.04}}
+
+
+@pytest.mark.parametrize("table", [False, True])
+def test_momentum_balances_with_the_contact_forces(table: bool) -> None:
     """m (J_c v̇ + J̇_c v) = Σ f + m g at every tick of a landing: Pinocchio's Jacobian, MuJoCo's accelerations."""
-    plant, kinematics = new_plant(stand(), height=0.02), Kinematics(ROBOT)
-    truths = run(plant, 150)
+    scenario = stand(world__objects=table_under_the_right_palm()) if table else stand()
+    plant, kinematics = new_plant(scenario, height=0.02), Kinematics(ROBOT)
+    truths, palm = [], []
+    for _ in range(150):
+        truths += run(plant, 1)
+        palm.append(plant.measure().palm_force_in_world[1, 2])
     touched = 0
     for now, following in pairwise(truths):
         qacc = (following.qvel - now.qvel) / STEP
@@ -61,6 +75,8 @@ def test_momentum_balances_with_the_contact_forces() -> None:
         assert_allclose(rate, force, atol=1e-6 * WEIGHT)
         touched += now.contact_count > 0
     assert 50 < touched < 149  # in the air, then on the floor
+    assert min(palm) >= 0.0
+    assert (max(palm) > 1.0) == table
 
 
 def test_truth_is_of_the_start_of_its_step() -> None:
@@ -126,6 +142,20 @@ def test_a_push_delivers_its_impulse(time: float, duration: float, impulse: Any,
     gained = ROBOT.mass * (plant.data.subtree_linvel[1] - fallen)
     # MuJoCo takes M at the start of each step: the CoM's velocity is exact to the step times the speed of the limbs
     assert_allclose(gained, impulse, atol=0.02 * max(np.linalg.norm(impulse), 0.1))
+
+
+def test_a_push_turns_the_robot_about_its_point() -> None:
+    """Angular momentum about the CoM after a short push: (point - CoM) × impulse."""
+    point, impulse = np.array([0.03, 0.08, 0.05]), np.array([0.2, -0.1, 0.15])
+    push = {"kind": "impulse", "body": "torso", "time": 0.0, "duration": 0.002}
+    push |= {"impulse": impulse.tolist(), "point": point.tolist()}
+    plant = new_plant(stand(disturbances=[push]), height=1.0)
+    torso = plant.data.body("torso")
+    arm = torso.xpos + torso.xmat.reshape(3, 3) @ point - plant.data.subtree_com[1]
+    for _ in range(2):
+        plant.step(np.zeros(ROBOT.nj))
+    mujoco.mj_subtreeVel(plant.model, plant.data)
+    assert_allclose(plant.data.subtree_angmom[1], np.cross(arm, impulse), rtol=0.05, atol=3e-4)
 
 
 def test_pushes_add_up_and_act_on_their_body() -> None:

@@ -151,11 +151,12 @@ def test_com_converges_in_a_world_that_obeys() -> None:
         assert_allclose(placement(q, frame).homogeneous, sole, atol=1e-3)
 
 
+@pytest.mark.parametrize("normal", [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-0.6, 0.8, 0.0]])
 @pytest.mark.parametrize("cap", [0.0, 1.0, 3.0])
-def test_hand_force_follows_its_cap(cap: float) -> None:
-    command = make_tracker().solve(state(), bracing(ROBOT.home_q, cap=cap, force=6.0))
+def test_hand_force_follows_its_cap(cap: float, normal: list[float]) -> None:
+    command = make_tracker().solve(state(), bracing(ROBOT.home_q, cap=cap, force=6.0, normal=np.array(normal)))
     assert command.status == SolveStatus.SOLVED
-    assert command.palm_force_in_world[1, 2] == pytest.approx(cap, abs=1e-6)
+    assert command.palm_force_in_world[1] @ normal == pytest.approx(cap, abs=1e-6)
     if cap == 0.0:
         assert_allclose(command.palm_force_in_world, 0.0, atol=1e-6)
 

@@ -125,6 +125,22 @@ def test_joint_bounds_keep_range_and_speed(where: np.ndarray, how_fast: np.ndarr
     assert (reached | (np.abs(velocity) > 1.0)).all()  # the bounds let a joint come to its limit
 
 
+@settings(max_examples=60, deadline=None)
+@given(where=shares, speed=shares)
+def test_joint_bounds_are_those_of_the_horizon(where: np.ndarray, speed: np.ndarray) -> None:
+    """After one horizon at the bound, the joint is at its limit or at its top speed, and beyond neither."""
+    h, top = 0.025, np.minimum(5.0, 0.95 * ROBOT.joint_speed)
+    position = ROBOT.joint_lower + where * (ROBOT.joint_upper - ROBOT.joint_lower)
+    velocity = (2 * speed - 1) * top
+    lower, upper = LIMITS.acceleration(position, velocity)
+    for sign, limit, bound in ((-1, ROBOT.joint_lower, lower), (1, ROBOT.joint_upper, upper)):
+        room = sign * (limit - (position + h * velocity + h**2 / 2 * bound))
+        spare = top - sign * (velocity + h * bound)
+        free = (np.abs(bound) < 1999.0) & (np.abs(position + h * velocity - limit) > 0.08)  # both sides agree
+        assert (np.minimum(room, spare)[free] > -1e-9).all()
+        assert (np.minimum(room, spare)[free] < 1e-9).all()
+
+
 @settings(max_examples=40, deadline=None)
 @given(beyond=st.floats(0.0, 0.2), speed=st.floats(-5, 5))
 def test_a_joint_beyond_its_range_is_led_back(beyond: float, speed: float) -> None:
