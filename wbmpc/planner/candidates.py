@@ -14,6 +14,7 @@ from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vector
 
+COM_COST = 4.0  # [cost / m²] how hard a candidate's posture keeps its CoM over the feet
 COM_TOLERANCE = 0.004  # [m] how far outside the ZMP bounds a candidate's posture may have its CoM
 
 
@@ -43,7 +44,9 @@ class Candidates:
     ) -> None:
         self._robot, self._settings = robot, settings
         self.all = [
-            Candidate(patch, hand, Posture(robot, nominal=nominal)) for patch in patches for hand in range(len(SIDES))
+            Candidate(patch, hand, Posture(robot, nominal=nominal, com_cost=COM_COST))
+            for patch in patches
+            for hand in range(len(SIDES))
         ]
         self._turn = 0
         self._backend = backend
@@ -53,7 +56,7 @@ class Candidates:
         self._slots = slots
 
     def refresh(self, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int, everyone: bool = False) -> None:
-        """Improve the posture of the next candidate in turn, or of everyone, for feet at `soles` (2, 3), `yaws` (2,)."""
+        """Improve the posture of the next candidate in turn, or of all, for feet at `soles` (2, 3), `yaws` (2,)."""
         if not self.all:
             return
         turn = self.all if everyone else [self.all[self._turn % len(self.all)]]

@@ -24,6 +24,16 @@ class Need:
     polygons: tuple[SupportPolygon, ...]  # n of them
     phantom: Vector  # (n, 2) [N m] 0 for the exact formulation; the paper's extra term m c_z c̈ c̈_z / g otherwise
 
+    def followed_by(self, other: Need) -> Need:
+        """The knots of both, this one's first."""
+        return Need(
+            delta_z=np.vstack([self.delta_z, other.delta_z]),
+            zmp=np.vstack([self.zmp, other.zmp]),
+            weight=np.concatenate([self.weight, other.weight]),
+            polygons=self.polygons + other.polygons,
+            phantom=np.vstack([self.phantom, other.phantom]),
+        )
+
     def pick(self, knots: list[int]) -> Need:
         """The same need at some knots only."""
         return Need(

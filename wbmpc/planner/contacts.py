@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from wbmpc.planner.candidates import Candidates
-from wbmpc.planner.contact_force import ContactChoice, ContactForce, Need
+from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
@@ -94,11 +94,19 @@ class Contacts:
                 events.append(f"contact {SIDES[side]} {patch}: {before.name.lower()} -> {contact.phase.name.lower()}")
 
     def plan(
-        self, need: Need, *, palms: Vector, hand_taken: list[bool], polygon: SupportPolygon, events: list[str]
+        self,
+        need: Need,
+        *,
+        final: Need | None,
+        palms: Vector,
+        hand_taken: list[bool],
+        polygon: SupportPolygon,
+        events: list[str],
     ) -> tuple[tuple[CandidateReport, ...], StageReport]:
         """Judge the need, choose a contact when one is missing, and plan the forces of those that touch.
 
         Args:
+            final: what the running task will need at its end, beyond the horizon; None without such a task.
             palms: (2, 3) measured [m].
             hand_taken: hands that a task uses.
             polygon: where the CoM may be before a contact carries load.
@@ -117,7 +125,7 @@ class Contacts:
             if not self._needed:
                 self._hopeless = 0.0
             elif self._since_fired >= RETRY_PLANS and any(free) and self._hopeless < GIVE_UP_TIME:
-                reports, stage = self._fire(need, palms=palms, free=free, polygon=polygon, events=events)
+                reports, stage = self._fire(need, final, palms=palms, free=free, polygon=polygon, events=events)
             if self._needed and not any(c.phase == ContactPhase.CHOSEN for c in self.hands):
                 self._hopeless += self._period
             for contact in self.hands:
@@ -126,16 +134,27 @@ class Contacts:
         return reports, force_stage if stage is NOT_RUN else stage
 
     def _fire(
-        self, need: Need, *, palms: Vector, free: list[bool], polygon: SupportPolygon, events: list[str]
+        self,
+        need: Need,
+        final: Need | None,
+        *,
+        palms: Vector,
+        free: list[bool],
+        polygon: SupportPolygon,
+        events: list[str],
     ) -> tuple[tuple[CandidateReport, ...], StageReport]:
-        """Stage 3's choice, on the two knots that ask for the largest shift in all and sideways."""
+        """Stage 3's choice, on two knots: the largest shift in the horizon, and the task's end or the largest sideways.
+
+        At the first sign of need the horizon shows a few millimetres; the contact must also do for where this leads.
+        """
         self._since_fired = 0
         sizes = np.abs(need.delta_z)
         worst = int(np.argmax(sizes.max(axis=1)))
-        sideways = int(np.argmax(sizes[:, 1])) if sizes[:, 1].max() > 1e-3 else worst
-        winner, reports, stage = self.candidates.choose(
-            need.pick([worst, sideways][: ContactChoice.KNOTS]), palms=palms, free_hands=free, polygon=polygon
-        )
+        if final is not None and np.abs(final.delta_z).max() > self._settings.need_threshold:
+            knots = need.pick([worst]).followed_by(final)
+        else:
+            knots = need.pick([worst, int(np.argmax(sizes[:, 1]))])
+        winner, reports, stage = self.candidates.choose(knots, palms=palms, free_hands=free, polygon=polygon)
         answer = f"chose {winner.patch.name} for the {SIDES[winner.hand]} hand" if winner else "no candidate helps"
         events.append(f"stage 3 fired: |ΔZ| {1e3 * sizes.max():.1f} mm at knot {worst + 1}, {answer}")
         if winner:

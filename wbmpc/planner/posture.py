@@ -9,7 +9,7 @@ from wbmpc.robot import Robot
 from wbmpc.rotations import level_frame, rotation_error
 from wbmpc.signals import Vector
 
-SOLE_COST, PALM_COST, COM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 2.0, 3.0, 2e-3
+SOLE_COST, PALM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3.0, 2e-3
 DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
@@ -17,7 +17,7 @@ JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm c
 
 
 class Posture:
-    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 2 |c_xy − centre|² + 3 (c_z − nominal)²
+    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + w |c_xy − centre|² + 3 (c_z − nominal)²
     + 2e-3 |posture error|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
@@ -25,9 +25,9 @@ class Posture:
     started from the last, keep it current while targets move.
     """
 
-    def __init__(self, robot: Robot, *, nominal: Vector) -> None:
-        """`nominal` (nq,) is the posture to deviate from as little as possible, and the start."""
-        self._robot, self._nominal = robot, nominal
+    def __init__(self, robot: Robot, *, nominal: Vector, com_cost: float) -> None:
+        """`nominal` (nq,): posture to deviate from as little as possible, and the start; `com_cost`: w [cost / m²]."""
+        self._robot, self._nominal, self._com_cost = robot, nominal, com_cost
         self._kinematics = Kinematics(robot)
         self._kinematics.update_kinematics(nominal)
         self._height = float(self._kinematics.com[2])
@@ -85,8 +85,8 @@ class Posture:
                 g += PALM_COST * (J.T @ error)
             self.com = kinematics.com
             J = kinematics.com_jacobian[:2]
-            H += COM_COST * (J.T @ J)
-            g += COM_COST * (J.T @ (centre - self.com[:2]))
+            H += self._com_cost * (J.T @ J)
+            g += self._com_cost * (J.T @ (centre - self.com[:2]))
             J = kinematics.com_jacobian[2]
             H += HEIGHT_COST * np.outer(J, J)
             g += HEIGHT_COST * (self._height - self.com[2]) * J

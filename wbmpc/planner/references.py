@@ -15,6 +15,7 @@ from wbmpc.signals import SIDES, HandMode, Vector
 
 REACH_FLOOR = 0.12  # [m] smallest d: a hand never pins the CoM to itself
 UNBOUNDED = 0.3  # [m] d of a hand without a reference
+COM_COST = 2.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 SHRINK_RATE, SHRINK_LIMIT = 1.0, 0.02  # [1/s], [m] how a held hand that stays short tightens its d
 
 
@@ -36,7 +37,7 @@ class References:
             if isinstance(task, ReachTask)
         ]
         self._heights = [task for task in tasks if isinstance(task, ComHeightTask)]
-        self._goal = Posture(robot, nominal=q)
+        self._goal = Posture(robot, nominal=q, com_cost=COM_COST)
         self._shrink = 0.0  # [m] taken off d
 
     # ------------------------------------------------------------------ once a plan
@@ -131,6 +132,12 @@ class References:
                     target = (*reach.reference()[:2], HandMode.MOVE)
             targets.append(target)
         return targets
+
+    @property
+    def goal_com(self) -> Vector | None:
+        """CoM (3,) [m] where the running reach ends; None when none is on its way or holding."""
+        running = any(r.phase in (ReachPhase.WAIT, ReachPhase.GO, ReachPhase.HOLD) for r in self.reaches)
+        return self._goal.com if running else None
 
     @property
     def progress(self) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 
 from wbmpc.signals import Vector
 
+PROJECTIONS = 20
 MAX_EDGES = 8  # two rectangles have a hull of at most eight edges
 
 
@@ -78,6 +79,17 @@ class SupportPolygon:
     def shrunk(self, margin: float) -> SupportPolygon:
         """The same polygon with a further inset of `margin` [m]."""
         return replace(self, offsets=self.offsets - margin)
+
+    def nearest(self, point: Vector) -> Vector:
+        """The point (2,) of the shrunk polygon nearest to `point` (2,) [m], by Dykstra's alternating projections."""
+        z = np.array(point[:2], dtype=np.float64)
+        correction = np.zeros_like(self.normals)
+        for _ in range(PROJECTIONS):
+            for i, (normal, offset) in enumerate(zip(self.normals, self.offsets, strict=True)):
+                before = z + correction[i]
+                z = before - max(float(normal @ before) - offset, 0.0) * normal
+                correction[i] = before - z
+        return z
 
     def excess(self, point: Vector) -> float:
         """How far `point` (2,) lies outside the shrunk polygon [m]; negative inside (largest edge violation)."""

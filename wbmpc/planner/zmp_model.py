@@ -50,6 +50,18 @@ def loaded_model(
     return ZmpModel(a, b, offset)
 
 
+def need_at_rest(com: Vector, *, polygon: SupportPolygon, mass: float) -> Need:
+    """The need, of one knot, of standing still with the CoM at `com` (3,) [m]: the smallest shift into the polygon."""
+    zmp = com[:2]
+    return Need(
+        delta_z=(polygon.nearest(zmp) - zmp)[None],
+        zmp=zmp[None],
+        weight=np.array([mass * GRAVITY]),
+        polygons=(polygon,),
+        phantom=np.zeros((1, 2)),
+    )
+
+
 def need_of(
     wish: HorizontalPlan,
     height: HeightPlan,
