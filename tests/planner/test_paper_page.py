@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
 NAMED = sorted(set(re.findall(r"`((?:wbmpc|tests|scenarios)/[\w/]+\.(?:py|yaml)[\w.:]*)`", PAGE)))
 
+# every label of the paper's source
 LABELS = [
     "Newton-Euler1",
     "Newton-Euler2",
@@ -40,7 +41,7 @@ LABELS = [
     "fig2",
     "fig3",
     "fig4",
-]  # every \label of the paper's source
+]
 
 
 def names_in(path: Path) -> set[str]:

@@ -15,12 +15,13 @@ from wbmpc.signals import Vector
 
 ROBOT = surena()
 HOME = ROBOT.home_q
+COM_COST = 2.0
 SOLES, YAWS, CENTRE = soles(HOME), np.zeros(2), np.zeros(2)
 LOWER, UPPER = ROBOT.joint_lower + JOINT_MARGIN, ROBOT.joint_upper - JOINT_MARGIN
 
 
 def reached(targets: list[Vector | None], iterations: int = 60) -> Posture:
-    posture = Posture(ROBOT, nominal=HOME)
+    posture = Posture(ROBOT, nominal=HOME, com_cost=COM_COST)
     posture.iterate(iterations, soles=SOLES, yaws=YAWS, palms=targets, centre=CENTRE)
     return posture
 

@@ -101,7 +101,7 @@ def random_problem(seed: int) -> Problem:
         polygons=tuple(POLYGON.shrunk(0.008 * t) for t in PREVIEW.times),
         com_reference=np.tile(POLYGON.centre, (N, 1)),
         reach=reach,
-        reach_distance=rng.uniform(0.12, 0.25, (2, 2)),
+        reach_distance=rng.uniform([[0.12, 0.02]] * 2, [[0.25, 0.2]] * 2),
         delta_z_limit=float(rng.choice([0.0, 0.01, FAR])),
         tasks=velocity_tasks(rng),
         urgency=float(rng.choice([1.0, 20.0])),
