@@ -52,6 +52,7 @@ class Plant:
         self._sole_wrench = np.zeros((2, 6))
         self._palm_force = np.zeros((2, 3))
         self.data.qpos[:] = qpos
+        mujoco.mj_forward(model, self.data)  # the first measurement has an acceleration too
         mujoco.mj_step1(model, self.data)
 
     @property
@@ -166,7 +167,9 @@ class Plant:
         pairs, address, frame = pairs[:count], address[:count], frame[:count].reshape(count, 3, 3)
         local = d.efc_force[address[:, None] + np.arange(3)]  # normal, two tangents (elliptic cone)
         on_second = np.einsum("ci,cij->cj", local, frame)  # the normal points from the first geom to the second
+        spin = np.where(contact.dim[keep][:count] >= 4, d.efc_force[np.minimum(address + 3, d.nefc - 1)], 0.0)
         second_is_robot = self._is_robot[pairs[:, 1]]
+        torsion = np.where(second_is_robot, spin, -spin)[:, None] * frame[:, 0]  # condim 4: moment about the normal
         world = np.where(second_is_robot[:, None], on_second, -on_second)
         geoms[:count], position[:count], force[:count], distance[:count] = pairs, where[:count], world, gap[:count]
         for side in range(2):
@@ -179,6 +182,7 @@ class Plant:
                 total[3] = arm[:, 1] @ forces[:, 2] - arm[:, 2] @ forces[:, 1]
                 total[4] = arm[:, 2] @ forces[:, 0] - arm[:, 0] @ forces[:, 2]
                 total[5] = arm[:, 0] @ forces[:, 1] - arm[:, 1] @ forces[:, 0]
+                total[3:] += torsion[mask].sum(axis=0)
             mask = (pairs == self._palm_geoms[side]).any(axis=1)
             if mask.any():
                 self._palm_force[side] = world[mask].sum(axis=0)

@@ -21,7 +21,11 @@ def rotation_error(*, desired: Vector, measured: Vector) -> Vector:
     sine = 0.5 * float(np.sqrt(axis @ axis))
     cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
     if sine < 1e-9:
-        return 0.5 * axis
+        if cosine > 0.0:
+            return 0.5 * axis
+        about = R + np.eye(3)  # 2 a aᵀ for a half turn about a
+        column = about[:, int(np.argmax(np.diag(about)))]
+        return np.pi * column / np.sqrt(column @ column)
     return axis * (0.5 * np.arctan2(sine, cosine) / sine)
 
 

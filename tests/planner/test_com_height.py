@@ -98,7 +98,6 @@ def test_a_start_outside_the_limits_still_has_a_plan() -> None:
     assert plan.height[-1] <= LIMITS[0, 1] + 1e-4
 
 
-@pytest.mark.xfail(reason="a band whose bounds cross is infeasible instead of a compromise", strict=True)
 def test_end_effectors_that_disagree_meet_in_the_middle() -> None:
     """One hand wants the CoM in 0.23 … 0.27, the other in 0.17 … 0.21: the band's bounds cross."""
     band = np.tile([0.23, 0.21], (N, 1))

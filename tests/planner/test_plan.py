@@ -122,7 +122,6 @@ def test_a_late_plans_positions_stop_after_one_knot() -> None:
     assert_allclose(late.hand_position, later.hand_position)
 
 
-@pytest.mark.xfail(reason="the tail's positions hold still, its velocities do not", strict=True)
 @pytest.mark.parametrize("late", [2 * T, N * T + 0.3])
 def test_a_late_plans_tail_is_one_motion(late: float) -> None:
     """Where the positions hold still the velocities are zero."""

@@ -226,7 +226,6 @@ def test_a_state_that_is_no_number_keeps_the_last_plan_and_says_so() -> None:
     assert np.isfinite(broken.sample(0.02).com_position).all()
 
 
-@pytest.mark.xfail(reason="the filter of the CoM velocity stays nan", strict=True)
 def test_a_failed_stage_recovers_once_the_state_is_sound() -> None:
     planner = make_planner(scenario("stand"))
     for k in range(3):

@@ -29,12 +29,15 @@ class ComState:
 
     def filter(self, velocity: Vector) -> None:
         """Take in a measured CoM velocity (3,) [m/s]."""
-        self._velocity += VELOCITY_SHARE * (velocity - self._velocity)
+        if np.isfinite(velocity).all():  # one broken measurement must not stay in the filter
+            self._velocity += VELOCITY_SHARE * (velocity - self._velocity)
 
     def update(self, planned: Vector, *, measured: Vector, height: float) -> None:
         """Continue from the last plan's state (3, 3), given the measured CoM (3,) and its height over the feet [m]."""
         settings = self._settings
         self.value = planned
+        if not np.isfinite(measured).all():
+            return
         position_error = measured[:2] - planned[:2, 0]
         velocity_error = self._velocity[:2] - planned[:2, 1]
         omega = np.sqrt(GRAVITY / max(height, 0.05))

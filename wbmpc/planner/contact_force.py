@@ -78,7 +78,7 @@ def polygon_rows(need: Need, point: Vector) -> Vector:
 def polygon_bound(need: Need) -> Vector:
     """Right-hand side q (n, MAX_EDGES) [N m] of `polygon_rows`."""
     A, b = _half_planes(need)
-    return need.weight[:, None] * (b - np.einsum("kei,ki->ke", A, need.zmp))
+    return need.weight[:, None] * (b - np.einsum("kei,ki->ke", A, need.zmp)) - np.einsum("kei,ki->ke", A, need.phantom)
 
 
 def _half_planes(need: Need) -> tuple[Vector, Vector]:

@@ -71,12 +71,12 @@ class Contacts:
 
     # ------------------------------------------------------------------ one plan
 
-    def advance(self, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
+    def advance(self, dt: float, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
         """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N]."""
         for contact in self.hands:
             side, before, patch = contact.side, contact.phase, self.name(contact.side)
             outcome = contact.advance(
-                self._period,
+                dt,
                 palm=palms[side],
                 force=palm_forces[side],
                 wanted_force=float(self.forces[side, 0] @ contact.patch.normal) if contact.patch else 0.0,

@@ -46,6 +46,10 @@ class Plan:
     def com_state(self, time: float) -> Vector:
         """CoM state (3 axes, 3) = c, ċ, c̈ at `time` [m, m/s, m/s²]; it stays at the last knot after the horizon."""
         elapsed = max(time - self.time, 0.0)
+        if elapsed > self.step * len(self.com_jerk) + 1e-9:
+            out = np.zeros((3, 3))
+            out[:, 0] = self.com_states[-1, :, 0]
+            return out
         knot = min(int(elapsed / self.step + 1e-9), len(self.com_jerk) - 1)
         t = min(elapsed - knot * self.step, self.step)
         state, jerk = self.com_states[knot], self.com_jerk[knot]
@@ -58,6 +62,7 @@ class Plan:
     def sample(self, time: float) -> Setpoint:
         """The setpoint at `time` ≥ the snapshot's."""
         dt = min(max(time - self.time, 0.0), self.step)
+        going = 1.0 if time - self.time <= self.step + 1e-9 else 0.0  # a late plan's tail holds still
         com = self.com_state(time)
         wx, wy, wz = dt * self.torso_angular_velocity
         turn = np.array([[1.0, -wz, wy], [wz, 1.0, -wx], [-wy, wx, 1.0]])
@@ -67,18 +72,18 @@ class Plan:
             com_velocity=com[:, 1],
             com_acceleration=com[:, 2],
             joint_position=self.q[7:] + dt * self.velocity[6:],
-            joint_velocity=self.velocity[6:],
+            joint_velocity=going * self.velocity[6:],
             torso_rotation=turn @ self.torso_rotation,
-            torso_angular_velocity=self.torso_angular_velocity,
+            torso_angular_velocity=going * self.torso_angular_velocity,
             foot_stance=self.foot_stance,
             foot_position=self.foot_position + dt * self.foot_velocity + dt**2 / 2 * self.foot_acceleration,
             foot_yaw=self.foot_yaw,
-            foot_velocity=self.foot_velocity + dt * self.foot_acceleration,
-            foot_acceleration=self.foot_acceleration,
+            foot_velocity=going * (self.foot_velocity + dt * self.foot_acceleration),
+            foot_acceleration=going * self.foot_acceleration,
             hand_mode=self.hand_mode,
             hand_position=self.hand_position + dt * self.hand_velocity + dt**2 / 2 * self.hand_acceleration,
-            hand_velocity=self.hand_velocity + dt * self.hand_acceleration,
-            hand_acceleration=self.hand_acceleration,
+            hand_velocity=going * (self.hand_velocity + dt * self.hand_acceleration),
+            hand_acceleration=going * self.hand_acceleration,
             hand_force=self.hand_force,
             hand_force_cap=np.minimum(
                 np.maximum(self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0), self.hand_force_cap_top

@@ -69,6 +69,10 @@ class Planner:
         self._joints = JointReference(robot, settings.whole_body, q=q)
         self._improve_postures(self._polygon().centre, iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
+        self._time, self._elapsed = (
+            0.0,
+            period,
+        )  # [s] of the last snapshot, and since it: longer when a plan was skipped
 
     def solve(self, state: RobotState) -> Plan:
         """Plan from a snapshot. A failed solve keeps the last plan (or stands still) and says so in the report."""
@@ -173,18 +177,24 @@ class Planner:
         self._palms = np.array([self._measured.position(f) for f in self._robot.palm_frames])
         self._com.filter(self._measured.com_velocity)
         if self._last is not None:
+            self._elapsed = state.time - self._time
             planned = self._last.com_state(state.time)
             plane = float(self._soles[:, 2].mean())
             self._com.update(planned, measured=self._measured.com, height=float(planned[2, 0]) - plane)
-            self._joints.advance(self._last.velocity, self._period)
+            self._joints.advance(self._last.velocity, self._elapsed)
+        self._time = state.time
 
     def _advance(self, state: RobotState, polygon: SupportPolygon, events: list[str]) -> None:
         """Tasks, contacts and the postures behind them one plan further."""
         contacts, references = self._contacts, self._references
         gate_open = contacts.gate_open
-        references.advance(state.time, self._period, gate_open=gate_open, palms=self._palms, events=events)
+        references.advance(state.time, self._elapsed, gate_open=gate_open, palms=self._palms, events=events)
         contacts.advance(
-            palms=self._palms, palm_forces=state.palm_force_in_world, homes=self._palm_homes, events=events
+            self._elapsed,
+            palms=self._palms,
+            palm_forces=state.palm_force_in_world,
+            homes=self._palm_homes,
+            events=events,
         )
         self._improve_postures(polygon.centre, iterations=2)
 

@@ -34,7 +34,7 @@ class Posture:
         self._lower, self._upper = robot.joint_lower + JOINT_MARGIN, robot.joint_upper - JOINT_MARGIN
         self.q = nominal.copy()  # (nq,)
         self.com = np.zeros(3)  # [m] of the last iterate
-        self.residual = np.inf  # [m] largest palm error of the last iterate
+        self.residual = np.inf  # [m] largest palm or sole error of the last iterate
         self._reached: tuple[bool, ...] = ()  # which palms had a target
         self._targets: tuple[bytes, ...] = ()
         self._step = np.inf  # [rad, m] largest change of the last iteration
@@ -61,6 +61,7 @@ class Posture:
             kinematics.update_kinematics(self.q)
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
+            self.residual = 0.0
             for side, frame in enumerate(robot.sole_frames):
                 level = level_frame(yaws[side])
                 J = kinematics.jacobian(frame)
@@ -70,9 +71,9 @@ class Posture:
                         rotation_error(desired=level, measured=kinematics.rotation(frame)),
                     ]
                 )
+                self.residual = max(self.residual, float(np.linalg.norm(error[:3])))
                 H += SOLE_COST * (J.T @ J)
                 g += SOLE_COST * (J.T @ error)
-            self.residual = 0.0
             for side, frame in enumerate(robot.palm_frames):
                 target = palms[side]
                 if target is None:

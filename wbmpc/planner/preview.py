@@ -54,18 +54,26 @@ class Preview:
         return mass * (GRAVITY + vertical_acceleration) / denominator, mass * height / denominator
 
     def zmp_offset(
-        self, *, point: Vector, force: Vector, vertical_acceleration: Vector, mass: float, plane_height: float
+        self,
+        *,
+        point: Vector,
+        force: Vector,
+        vertical_acceleration: Vector,
+        vertical_force: Vector,
+        mass: float,
+        plane_height: float,
     ) -> Vector:
-        """Offset j (N, 2) of Z = a c − b c̈ + j [m], [M] eq. ak_bk_qk with the erratum of docs/paper.md.
+        """One force's part (N, 2) of j in Z = a c − b c̈ + j [m], [M] eq. ak_bk_qk with the erratum of docs/paper.md.
 
         Args:
             point: (N, 3) where the force acts, in world [m].
             force: (N, 3) on the robot, in world [N].
             vertical_acceleration: (N,) c̈_z [m/s²].
+            vertical_force: (N,) f_z of all contacts together [N].
             mass: of the robot [kg].
             plane_height: height of the ZMP plane in world [m].
         """
-        denominator = mass * (vertical_acceleration + GRAVITY) - force[:, 2]
+        denominator = mass * (vertical_acceleration + GRAVITY) - vertical_force
         lever = point[:, 2] - plane_height
         return (lever[:, None] * force[:, :2] - point[:, :2] * force[:, 2:]) / denominator[:, None]
 

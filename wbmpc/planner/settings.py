@@ -28,15 +28,16 @@ class HeightSettings(StrictModel):
 class WholeBodySettings(StrictModel):
     """Stage 2: horizontal CoM, ΔZ and joint velocities."""
 
-    jerk_cost: float = Field(1e-5, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
-    delta_z_cost: float = Field(1.0, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
+    jerk_cost: float = Field(1e-4, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
+    delta_z_cost: float = Field(0.2, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
     joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
     com_velocity_cost: float = Field(1000.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
     hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
-    velocity_cost: float = Field(3e-2, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
-    position_cost: float = Field(3e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
+    velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
+    position_cost: float = Field(5e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
+    rest_slack_cost: float = Field(1e4, gt=0, description="[cost / m²] price of a plan that cannot stop at its end")
     zmp_margin: float = Field(0.018, ge=0, description="[m] inset of the support polygon")
     zmp_margin_alarm: float = Field(
         0.0, description="[m] the inset when the measured capture point is far off the plan: a push; negative: outside"

@@ -63,12 +63,14 @@ class WholeBodyStage:
     over x = (U_x, U_y, ΔZ_x, ΔZ_y (N each), q̇ (nv)), subject to
 
         A_k (Z_k + ΔZ_k) ≤ b_k          ZMP in the support polygon of knot k ([M] eq. ZMP-constraint), soft
+        A_N (a (c_N + √(b/a) ċ_N) + j + ΔZ_N) ≤ b_N   the plan can come to rest at its end, soft
         |R_k − C_k| ≤ d                 reach of each active hand, per axis, soft
         J_foot q̇ = v_foot               stance feet stay, swing feet follow
         q̇_low ≤ q̇ ≤ q̇_high, |ΔZ| ≤ ΔZ_max.
 
     ċ is the velocity of the first knot's plan at the end of `velocity_time`, so jerks and q̇ agree. All norms are
-    weighted squares; the last three cost terms are not printed in the paper (damping, a weak pull, upright torso).
+    weighted squares; the last three cost terms are not printed in the paper (damping, a weak pull, upright torso), nor
+    is the row at the end of the horizon: without it a plan may keep every ZMP and still be falling over at knot N.
     """
 
     def __init__(self, preview: Preview, velocities: int, settings: WholeBodySettings, *, backend: str) -> None:
@@ -77,8 +79,10 @@ class WholeBodyStage:
         self._zmp_rows = slice(0, n * MAX_EDGES)
         self._reach_rows = slice(n * MAX_EDGES, n * MAX_EDGES + 4 * n)  # left x, left y, right x, right y
         self._foot_rows = slice(n * MAX_EDGES + 4 * n, n * MAX_EDGES + 4 * n + FOOT_ROWS)
-        rows = self._foot_rows.stop
+        self._rest_rows = slice(self._foot_rows.stop, self._foot_rows.stop + MAX_EDGES)
+        rows = self._rest_rows.stop
         soft = np.zeros(rows)
+        soft[self._rest_rows] = settings.rest_slack_cost
         soft[self._zmp_rows] = settings.zmp_slack_cost
         soft[self._reach_rows] = settings.reach_slack_cost
         self.problem = QuadraticProgram(4 * n + nv, rows, soft_weight=soft)
@@ -175,6 +179,16 @@ class WholeBodyStage:
         rows[self._knots, :, 2 * n + self._knots] = A[:, :, 0]
         rows[self._knots, :, 3 * n + self._knots] = A[:, :, 1]
         qp.upper[self._zmp_rows] = (offsets - np.einsum("kei,ki->ke", A, free_zmp)).ravel()
+
+        # capture point of the last knot
+        tau_end = np.sqrt(zmp.b[-1] / zmp.a[-1])
+        gain_end = zmp.a[-1] * (preview.P_pu[-1] + tau_end * preview.P_vu[-1])
+        rest = qp.matrix[self._rest_rows]
+        np.multiply(A[-1, :, :1], gain_end, out=rest[:, :n])
+        np.multiply(A[-1, :, 1:], gain_end, out=rest[:, n : 2 * n])
+        rest[:, 3 * n - 1], rest[:, 4 * n - 1] = A[-1, :, 0], A[-1, :, 1]
+        free_rest = zmp.a[-1] * (free[:, -1] + tau_end * free_velocity[:, -1]) + zmp.offset[-1]
+        qp.upper[self._rest_rows] = offsets[-1] - A[-1] @ free_rest
 
         # reach rows: |R - C| <= d
         for hand in range(2):

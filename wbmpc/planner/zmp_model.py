@@ -42,11 +42,17 @@ def loaded_model(
     a, b = preview.zmp_gains(
         height=height.height - plane, vertical_acceleration=height.acceleration, vertical_force=total, mass=mass
     )
-    feet = mass * (height.acceleration + GRAVITY) - total
     offset = np.zeros((preview.steps, 2))
     for force, point in zip(forces, points, strict=True):
         if point is not None:
-            offset += ((point[2] - plane) * force[:, :2] - point[:2] * force[:, 2:]) / feet[:, None]
+            offset += preview.zmp_offset(
+                point=np.tile(point, (preview.steps, 1)),
+                force=force,
+                vertical_acceleration=height.acceleration,
+                vertical_force=total,
+                mass=mass,
+                plane_height=plane,
+            )
     return ZmpModel(a, b, offset)
 
 

@@ -56,6 +56,7 @@ def _set_options(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 10  # friction much harder than the normal direction: stance feet must not creep
+    option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a diverged state must stay visible
     option.jacobian = mujoco.mjtJacobian.mjJAC_DENSE  # MuJoCo 4.0.0's sparse Newton solver is said to be wrong
 
 

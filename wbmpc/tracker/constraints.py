@@ -60,7 +60,7 @@ class JointLimits:
         """Lower and upper bound (nj,) on q̈ [rad/s²] at position [rad] and velocity [rad/s] (nj,).
 
         q + h q̇ + h²/2 q̈ stays inside the range and q̇ + h q̈ inside the speed limit; where both disagree (a state
-        already outside) the bounds collapse to the one that leads back.
+        already outside) the bounds collapse to their middle.
         """
         h = self._horizon
         ahead = position + h * velocity

@@ -48,6 +48,10 @@ class TaskStack:
             self._foot(kinematics, setpoint, side)
             self._hand(kinematics, setpoint, side)
 
+    def forget(self) -> None:
+        """Clear the integrals: after a failed solve their content is not to be trusted (it may not be finite)."""
+        self._com_integral[:], self._hand_integral[:] = 0.0, 0.0
+
     def _com(self, kinematics: Kinematics, setpoint: Setpoint) -> None:
         s = self._settings
         error = setpoint.com_position - kinematics.com

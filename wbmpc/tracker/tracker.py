@@ -98,6 +98,7 @@ class Tracker:
         base_offset = self._assemble(state, setpoint)
         solution = self._workspace.solve()
         if solution.status != SolveStatus.SOLVED:
+            self._tasks.forget()
             torque = self._torque - self._settings.fallback_damping * state.v[6:]
             return TorqueCommand(
                 torque=np.minimum(np.maximum(torque, lower), upper),
