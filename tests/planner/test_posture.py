@@ -90,7 +90,7 @@ def test_unreachable_places_are_told_in_the_order_of_their_distance() -> None:
 
 
 def test_a_free_hand_has_no_residual() -> None:
-    assert reached([None, None]).residual == 0.0
+    assert reached([None, None]).residual < 1e-6
 
 
 def test_the_posture_shifts_the_com_no_more_than_it_must() -> None:

@@ -136,6 +136,9 @@ def cost_and_violation(problem: Problem, plan: HorizontalPlan) -> float:
     for k, polygon in enumerate(problem.polygons):
         excess = polygon.normals @ plan.zmp[k] - polygon.offsets
         total += s.zmp_slack_cost * float(np.sum(np.maximum(excess, 0.0) ** 2))
+    end, a, b = problem.polygons[-1], problem.zmp.a[-1], problem.zmp.b[-1]
+    capture = a * (plan.com[-1] + np.sqrt(b / a) * plan.velocity[-1]) + problem.zmp.offset[-1] + plan.delta_z[-1]
+    total += s.rest_slack_cost * float(np.sum(np.maximum(end.normals @ capture - end.offsets, 0.0) ** 2))
     beyond = np.abs(problem.reach - plan.com) - problem.reach_distance[:, None, :]
     total += s.reach_slack_cost * float(np.nansum(np.maximum(beyond, 0.0) ** 2))
     return 0.5 * total
@@ -178,6 +181,18 @@ def reference(problem: Problem) -> tuple[Vector, float, dict[str, slice]]:
                 (_one(shifts[axis], k), column),
             ]
         qp.soft_bound(terms, np.full(len(b), -np.inf), b - A @ problem.zmp.offset[k], s.zmp_slack_cost)
+    end, a = problem.polygons[-1], problem.zmp.a[-1]
+    real = np.isfinite(end.offsets)
+    A, b, omega = end.normals[real], end.offsets[real], np.sqrt(a / problem.zmp.b[-1])
+    terms = []
+    for axis in range(2):
+        column = A[:, axis : axis + 1]
+        terms += [
+            (_one(positions[axis], N - 1), a * column),
+            (_one(velocities[axis], N - 1), a / omega * column),
+            (_one(shifts[axis], N - 1), column),
+        ]
+    qp.soft_bound(terms, np.full(len(b), -np.inf), b - A @ problem.zmp.offset[-1], s.rest_slack_cost)
     qd = qp.variables(ROBOT.nv)
     qp.cost([(qd, np.eye(ROBOT.nv))], t.posture_velocity, s.joint_velocity_cost)
     for row in range(3):

@@ -70,7 +70,12 @@ class ComHeightStage:
         )
         n = preview.steps
         qp.lower[:n], qp.upper[:n] = limits[:, 0] - drift, limits[:, 1] - drift
-        qp.lower[n:], qp.upper[n:] = band[:, 0] - drift, band[:, 1] - drift
+        low, high = band[:, 0], band[:, 1]
+        crossed = low > high
+        if crossed.any():  # two end-effectors disagree: the compromise between them
+            low, high = low.copy(), high.copy()
+            low[crossed] = high[crossed] = 0.5 * (low + high)[crossed]
+        qp.lower[n:], qp.upper[n:] = low - drift, high - drift
         solution = self._workspace.solve(matrices_changed=self._fresh)
         self._fresh = False
         if solution.status != SolveStatus.SOLVED:

@@ -155,8 +155,7 @@ def height_band(settings: HeightSettings, references: Vector, polygon: SupportPo
     high = np.fmin.reduce(z + settings.reach, axis=0)
     plane = polygon.plane_height
     low, high = np.fmax(low, plane + settings.lowest), np.fmin(high, plane + settings.highest)
-    middle = 0.5 * (low + high)  # where two end-effectors disagree the band is the compromise between them
-    return np.column_stack([np.where(low > high, middle, low), np.where(low > high, middle, high)])
+    return np.column_stack([low, high])
 
 
 def _hand_of(task: ReachTask, palms: Vector) -> int:
