@@ -56,7 +56,7 @@ class Estimator:
         omega = imu.rotation @ measurement.imu_gyro - imu_twist.angular  # of the base, in base
 
         force = measurement.sole_wrench_in_world
-        weight_sum, velocity, position = 0.0, np.zeros(3), np.zeros(3)
+        weight_sum, velocity, anchors, soles = 0.0, np.zeros(3), np.zeros(3), np.zeros(3)  # velocity, soles in base
         for side, frame in enumerate(robot.sole_frames):
             load = force[side, 2]
             sole = data.oMf[frame].translation
@@ -71,18 +71,19 @@ class Estimator:
             pressure = R.T @ np.array([-force[side, 4] / load, force[side, 3] / load, 0.0])
             point = sole + pressure
             moving = twist.linear + cross(twist.angular, pressure) + cross(omega, point)
-            velocity -= load * (R @ moving)
-            position += load * (self._anchor[side] - R @ sole)
+            velocity -= load * moving
+            anchors += load * self._anchor[side]
+            soles += load * sole
             weight_sum += load
 
         lever = R @ (cross(omega, imu.translation) + imu_twist.linear)  # IMU's velocity relative to the base's origin
         self._imu_velocity += step * (world_imu @ measurement.imu_accelerometer - np.array([0.0, 0.0, GRAVITY]))
         if weight_sum > 0.0:
-            self._imu_velocity += self.VELOCITY_GAIN * (velocity / weight_sum + lever - self._imu_velocity)
+            self._imu_velocity += self.VELOCITY_GAIN * (R @ velocity / weight_sum + lever - self._imu_velocity)
         base_velocity = self._imu_velocity - lever
         self._position += step * base_velocity
         if weight_sum > 0.0:
-            self._position += self.POSITION_GAIN * (position / weight_sum - self._position)
+            self._position += self.POSITION_GAIN * ((anchors - R @ soles) / weight_sum - self._position)
 
         vertical = float(force[:, 2].sum() + measurement.palm_force_in_world[:, 2].sum())
         if weight_sum > 0.0:

@@ -7,8 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.robot import Robot
+from wbmpc.rotations import cross
 from wbmpc.scenario import Disturbance, SensorSettings
 from wbmpc.signals import MAX_CONTACTS, SIDES, Measurement, Truth, Vector
+
+PARTS = np.arange(4)[:, None]  # left and right sole, left and right palm
 
 
 class Plant:
@@ -43,8 +46,9 @@ class Plant:
         self._torso = model.body("torso").id
         geom_body = model.geom_bodyid
         self._is_robot = model.body_rootid[geom_body] == self._root
-        self._foot_geoms = np.array([model.geom(f"{side}_foot").id for side in SIDES])
-        self._palm_geoms = np.array([model.geom(f"{side}_palm_geom").id for side in SIDES])
+        self._part = np.full(model.ngeom, -1)  # which of PARTS a geom is
+        for part, name in enumerate([f"{side}_foot" for side in SIDES] + [f"{side}_palm_geom" for side in SIDES]):
+            self._part[model.geom(name).id] = part
         self._sensor = {
             name: slice(int(model.sensor(name).adr[0]), int(model.sensor(name).adr[0] + model.sensor(name).dim[0]))
             for name in ("imu_quaternion", "imu_gyro", "imu_accelerometer")
@@ -172,20 +176,19 @@ class Plant:
         torsion = np.where(second_is_robot, spin, -spin)[:, None] * frame[:, 0]  # condim 4: moment about the normal
         world = np.where(second_is_robot[:, None], on_second, -on_second)
         geoms[:count], position[:count], force[:count], distance[:count] = pairs, where[:count], world, gap[:count]
+        part = np.maximum(self._part[pairs[:, 0]], self._part[pairs[:, 1]])
+        select = (part == PARTS).astype(np.float64)  # (4, count): soles, then palms
+        sums = select @ world
+        point = where[:count]
+        moment = torsion  # about the world's origin, then about the sole
+        moment[:, 0] += point[:, 1] * world[:, 2] - point[:, 2] * world[:, 1]
+        moment[:, 1] += point[:, 2] * world[:, 0] - point[:, 0] * world[:, 2]
+        moment[:, 2] += point[:, 0] * world[:, 1] - point[:, 1] * world[:, 0]
+        self._sole_wrench[:, :3] = sums[:2]
+        self._sole_wrench[:, 3:] = select[:2] @ moment
         for side in range(2):
-            mask = (pairs == self._foot_geoms[side]).any(axis=1)
-            if mask.any():
-                forces = world[mask]
-                total = self._sole_wrench[side]
-                total[:3] = forces.sum(axis=0)
-                arm = where[:count][mask] - sole[side]
-                total[3] = arm[:, 1] @ forces[:, 2] - arm[:, 2] @ forces[:, 1]
-                total[4] = arm[:, 2] @ forces[:, 0] - arm[:, 0] @ forces[:, 2]
-                total[5] = arm[:, 0] @ forces[:, 1] - arm[:, 1] @ forces[:, 0]
-                total[3:] += torsion[mask].sum(axis=0)
-            mask = (pairs == self._palm_geoms[side]).any(axis=1)
-            if mask.any():
-                self._palm_force[side] = world[mask].sum(axis=0)
+            self._sole_wrench[side, 3:] -= cross(sole[side], sums[side])
+        self._palm_force[:] = sums[2:]
         return count, geoms, position, force, distance
 
     def _centre_of_pressure(self, sole: Vector) -> Vector:

@@ -191,15 +191,10 @@ class WholeBodyStage:
         qp.upper[self._rest_rows] = offsets[-1] - A[-1] @ free_rest
 
         # reach rows: |R - C| <= d
-        for hand in range(2):
-            for axis in range(2):
-                block = slice(
-                    self._reach_rows.start + (2 * hand + axis) * n, self._reach_rows.start + (2 * hand + axis + 1) * n
-                )
-                gap = reach[hand, :, axis] - free[axis]
-                bounded = np.isfinite(gap)
-                qp.lower[block] = np.where(bounded, gap - reach_distance[hand, axis], -np.inf)
-                qp.upper[block] = np.where(bounded, gap + reach_distance[hand, axis], np.inf)
+        gap = reach.transpose(0, 2, 1) - free  # (hand, axis, N)
+        bounded, distance = np.isfinite(gap), reach_distance[:, :, None]
+        qp.lower[self._reach_rows] = np.where(bounded, gap - distance, -np.inf).ravel()
+        qp.upper[self._reach_rows] = np.where(bounded, gap + distance, np.inf).ravel()
 
         qp.matrix[self._foot_rows, self._qd] = tasks.foot_jacobian
         qp.lower[self._foot_rows] = qp.upper[self._foot_rows] = tasks.foot_velocity

@@ -5,12 +5,13 @@ from __future__ import annotations
 from time import perf_counter
 
 import numpy as np
+from scipy.linalg.lapack import dposv
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.qp import QuadraticProgram, make_workspace
 from wbmpc.robot import Robot
 from wbmpc.rotations import contact_frame
-from wbmpc.signals import HandMode, RobotState, Setpoint, SolveStatus, TorqueCommand, Vector
+from wbmpc.signals import RobotState, Setpoint, TorqueCommand, Vector
 from wbmpc.tracker.constraints import (
     PALM_ROWS,
     PRESSURE_ROWS,
@@ -21,7 +22,7 @@ from wbmpc.tracker.constraints import (
     sole_wrench_rows,
 )
 from wbmpc.tracker.settings import TrackerSettings
-from wbmpc.tracker.tasks import TaskStack
+from wbmpc.tracker.tasks import CONTACT, TaskStack
 
 FORCES = 18  # two sole wrenches (6 each), then two palm forces (3 each), each in its contact's own frame
 FRICTION_SPEED = 0.1  # [rad/s] wanted speed from which a joint's dry friction is fully compensated
@@ -80,6 +81,7 @@ class Tracker:
         self._contact_jacobian = np.zeros((FORCES, robot.nv))
         self._contact_rotation = np.zeros((4, 3, 3))  # soles, then palms: contact frame to world
         self._base_map = np.zeros((6, nj + FORCES))
+        self._base_right = np.zeros((6, nj + FORCES + 1), order="F")
         self._diagonal = np.zeros(nj + FORCES)
         self._reference = np.zeros(nj + FORCES)
         self._stacked = np.zeros((self._tasks.matrix.shape[0], nj + FORCES))
@@ -97,7 +99,7 @@ class Tracker:
         self._torque_bounds = lower, upper = self._limits.torque(state.v[6:])
         base_offset = self._assemble(state, setpoint)
         solution = self._workspace.solve()
-        if solution.status != SolveStatus.SOLVED:
+        if not solution.solved:
             self._tasks.forget()
             torque = self._torque - self._settings.fallback_damping * state.v[6:]
             return TorqueCommand(
@@ -155,7 +157,7 @@ class Tracker:
                 lower[sole], upper[sole] = -np.inf, np.inf
                 lower[6 * side + 2] = 0.0
             palm = slice(12 + 3 * side, 15 + 3 * side)
-            if setpoint.hand_mode[side] != HandMode.CONTACT:
+            if int(setpoint.hand_mode[side]) != CONTACT:
                 self._contact_jacobian[palm] = 0.0
                 continue
             R = contact_frame(setpoint.hand_normal[side])
@@ -175,12 +177,13 @@ class Tracker:
         qp, nj, settings, kinematics = self.problem, self._robot.nj, self._settings, self._kinematics
         M, h = state.mass_scale * kinematics.mass_matrix, state.mass_scale * kinematics.bias
         J = self._contact_jacobian
-        base_map = self._base_map
-        base_map[:, :nj] = -M[:6, 6:]
-        base_map[:, nj:] = J[:, :6].T
-        inverse = np.linalg.inv(M[:6, :6])
-        base_map[:] = inverse @ base_map
-        base_offset = -(inverse @ h[:6])
+        base_map, right = self._base_map, self._base_right
+        right[:, :nj] = -M[:6, 6:]
+        right[:, nj:-1] = J[:, :6].T
+        right[:, -1] = -h[:6]
+        _, solved, _ = dposv(M[:6, :6], right)
+        base_map[:] = solved[:, :-1]
+        base_offset = solved[:, -1]
 
         tasks, stacked = self._tasks, self._stacked
         np.matmul(tasks.matrix[:, :6], base_map, out=stacked)
