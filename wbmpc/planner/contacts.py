@@ -11,9 +11,10 @@ from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
+from wbmpc.planner.zmp_model import need_at_rest
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
+from wbmpc.signals import GRAVITY, SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
 
 RETRY_PLANS = 10  # plans between two firings of stage 3 when no candidate can help
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
@@ -97,7 +98,7 @@ class Contacts:
         self,
         need: Need,
         *,
-        final: Need | None,
+        goal: Vector | None,
         palms: Vector,
         hand_taken: list[bool],
         polygon: SupportPolygon,
@@ -106,7 +107,7 @@ class Contacts:
         """Judge the need, choose a contact when one is missing, and plan the forces of those that touch.
 
         Args:
-            final: what the running task will need at its end, beyond the horizon; None without such a task.
+            goal: CoM (3,) where the running task ends, beyond the horizon [m]; None without such a task.
             palms: (2, 3) measured [m].
             hand_taken: hands that a task uses.
             polygon: where the CoM may be before a contact carries load.
@@ -125,7 +126,7 @@ class Contacts:
             if not self._needed:
                 self._hopeless = 0.0
             elif self._since_fired >= RETRY_PLANS and any(free) and self._hopeless < GIVE_UP_TIME:
-                reports, stage = self._fire(need, final, palms=palms, free=free, polygon=polygon, events=events)
+                reports, stage = self._fire(need, goal, palms=palms, free=free, polygon=polygon, events=events)
             if self._needed and not any(c.phase == ContactPhase.CHOSEN for c in self.hands):
                 self._hopeless += self._period
             for contact in self.hands:
@@ -136,7 +137,7 @@ class Contacts:
     def _fire(
         self,
         need: Need,
-        final: Need | None,
+        goal: Vector | None,
         *,
         palms: Vector,
         free: list[bool],
@@ -150,6 +151,8 @@ class Contacts:
         self._since_fired = 0
         sizes = np.abs(need.delta_z)
         worst = int(np.argmax(sizes.max(axis=1)))
+        mass = float(need.weight[worst]) / GRAVITY
+        final = None if goal is None else need_at_rest(goal, polygon=polygon, mass=mass)
         if final is not None and np.abs(final.delta_z).max() > self._settings.need_threshold:
             knots = need.pick([worst]).followed_by(final)
         else:

@@ -18,7 +18,7 @@ from wbmpc.planner.references import References, height_band
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
-from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
+from wbmpc.planner.zmp_model import free_model, loaded_model, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose, Task
@@ -131,10 +131,9 @@ class Planner:
             wish, _ = stage_2(self._need_stage, model, full_pace, FREE_SHIFT)
             if wish is not None:
                 delta_z = wish.delta_z
-                goal = references.goal_com
                 candidates, stage3 = contacts.plan(
                     need_of(wish, height, model, polygons=polygons, mass=mass, exact=exact),
-                    final=None if goal is None else need_at_rest(goal, polygon=polygons[-1], mass=mass),
+                    goal=references.goal_com,
                     palms=self._palms,
                     hand_taken=references.hands_taken(),
                     polygon=polygons[-1],

@@ -12,6 +12,7 @@ from wbmpc.signals import Vector
 SOLE_COST, PALM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3.0, 2e-3
 DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
+PATIENCE = 120  # iterations for the same targets; what has not converged by then is out of reach
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
@@ -38,6 +39,7 @@ class Posture:
         self._reached: tuple[bool, ...] = ()  # which palms had a target
         self._targets: tuple[bytes, ...] = ()
         self._step = np.inf  # [rad, m] largest change of the last iteration
+        self._left = PATIENCE
 
     def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector) -> None:
         """Run `count` iterations.
@@ -54,10 +56,11 @@ class Posture:
             self.q, self._reached = self._nominal.copy(), reached
         targets = (soles.tobytes(), yaws.tobytes(), centre.tobytes(), *(p.tobytes() for p in palms if p is not None))
         if targets != self._targets:
-            self._targets, self._step = targets, np.inf
+            self._targets, self._step, self._left = targets, np.inf, PATIENCE
         for _ in range(count):
-            if self._step < CONVERGED:
+            if self._step < CONVERGED or self._left == 0:
                 return
+            self._left -= 1
             kinematics.update_kinematics(self.q)
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
