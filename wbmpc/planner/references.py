@@ -15,7 +15,7 @@ from wbmpc.signals import SIDES, HandMode, Vector
 
 REACH_FLOOR = 0.12  # [m] smallest d: a hand never pins the CoM to itself
 UNBOUNDED = 0.3  # [m] d of a hand without a reference
-COM_COST = 2.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
+COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 SHRINK_RATE, SHRINK_LIMIT = 1.0, 0.02  # [1/s], [m] how a held hand that stays short tightens its d
 
 

@@ -70,7 +70,7 @@ class ContactSettings(StrictModel):
         5.0, gt=0, description="[cost] weight of |f_t|²/(m g)²: friction is uncertain and turns the feet"
     )
     shift_slack_cost: float = Field(1.0, gt=0, description="[cost / m²] price of a ΔZ that the force does not give")
-    distance_cost: float = Field(1.0, ge=0, description="[cost / m] w_i per metre between the hand and candidate i")
+    distance_cost: float = Field(0.4, ge=0, description="[cost / m] w_i per metre between the hand and candidate i")
     reach_margin: float = Field(0.005, ge=0, description="[m] IK residual up to which a candidate counts as reachable")
     most_candidates: int = Field(16, ge=1, le=64, description="candidates that one firing considers, nearest first")
 
