@@ -56,14 +56,15 @@ def run_realtime(
     _warm_up(scenario, robot, model)
     session = Session(scenario, robot=robot, model=model, recorder=recorder)
     period, step, timing = scenario.loop.planner_period_ticks, session.step, LoopTiming()
-    worker = PlannerThread(session.planner, session.mailbox)
-    session.mailbox.arrived(0.0)  # the first plan, which the session made and recorded itself
+    finished = Mailbox()  # the tracker sees a plan only when the tick has taken it over and counted its latency
+    worker = PlannerThread(session.planner, finished)
     due = False
 
     def exchange(state: RobotState) -> None:
         """Take the plans that are ready, hand over a snapshot when one is due."""
         worker.check()
-        for plan in session.mailbox.arrived(state.time):
+        for plan in finished.arrived(state.time):
+            session.mailbox.post(plan, available_at=state.time)
             recorder.append_plan(plan.report)
             latency = state.time - plan.time
             timing.plan_latency.append(latency)
