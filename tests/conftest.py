@@ -1,3 +1,12 @@
-"""Choose MuJoCo's off-screen OpenGL before any test imports mujoco, which reads the choice only once."""
+"""Before any test: MuJoCo's off-screen OpenGL, which it chooses once at its import, and Hypothesis' profile."""
+
+import os
+
+from hypothesis import settings
 
 import wbmpc.render  # noqa: F401
+
+# The same examples at every run of CI: a red build then means that the change broke something.
+settings.register_profile("ci", derandomize=True, deadline=None)
+if os.environ.get("CI"):
+    settings.load_profile("ci")

@@ -64,8 +64,8 @@ def alone(need: Need, candidate: PatchPose) -> tuple[float, Vector] | None:
     p = candidate.position
     for k in range(len(need.zmp)):
         f = qp.variables(3)
-        qp.cost([(f, normal[None])], 0.0, SETTINGS.force_cost / unit)
-        qp.cost([(f, np.array([tangent_1, tangent_2]))], np.zeros(2), SETTINGS.tangent_cost / unit)
+        qp.cost([(f, normal[None])], 0.0, SETTINGS.force_cost)
+        qp.cost([(f, np.array([tangent_1, tangent_2]))], np.zeros(2), SETTINGS.tangent_cost)
         w, Z, wanted = need.weight[k], need.zmp[k], need.zmp[k] + need.delta_z[k]
 
         def moved(force: Vector, w: float = w, Z: Vector = Z) -> Vector:
@@ -75,7 +75,7 @@ def alone(need: Need, candidate: PatchPose) -> tuple[float, Vector] | None:
         linear = np.column_stack([moved(e) - moved(np.zeros(3)) for e in np.eye(3)])
         # pressure · (w − f_z) against wanted · (w − f_z), and against the polygon's edges
         G = linear + np.outer(wanted, UP)
-        qp.cost([(f, G)], w * wanted - moved(np.zeros(3)), SETTINGS.shift_slack_cost / unit)
+        qp.cost([(f, G)], w * wanted - moved(np.zeros(3)), SETTINGS.shift_slack_cost)
         polygon = need.polygons[k]
         real = np.isfinite(polygon.offsets)
         A, b = polygon.normals[real], polygon.offsets[real]
@@ -87,7 +87,7 @@ def alone(need: Need, candidate: PatchPose) -> tuple[float, Vector] | None:
         x, cost = qp.solve()
     except InfeasibleReference:
         return None
-    return cost, x.reshape(-1, 3)
+    return cost / unit, x.reshape(-1, 3)  # scaled to newtons: the reference's solver wants numbers near one
 
 
 def random_patches(seed: int) -> list[PatchPose]:
