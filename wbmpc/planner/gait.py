@@ -153,6 +153,7 @@ class Gait:
         shift, rest_shift = np.zeros((n, m)), np.zeros(m)
         com_reference, com_velocity = np.empty((n, 2)), np.empty((n, 2))
         polygons: list[SupportPolygon] = []
+        centring = np.zeros(n)
         made: dict[int, SupportPolygon] = {}
         which = 0
         for k, t in enumerate(times):
@@ -163,6 +164,7 @@ class Gait:
                 made[which] = _polygon(interval, half_extents, margin)
             polygons.append(made[which].shrunk(growth * t))
             _share(interval, shift[k])
+            centring[k] = float(interval.swing >= 0)
             com_reference[k] = interval.feet.positions[:, :2].mean(axis=0)
             com_velocity[k] = self._stepping.velocity(interval.feet, time + t)
         last = intervals[which]
@@ -175,6 +177,8 @@ class Gait:
             offsets=np.array([p.offsets for p in polygons]),
             shift=shift,
             polygons=tuple(polygons),
+            centres=np.array([p.centre for p in polygons]),
+            centring=centring,
             rest_normals=rest.normals,
             rest_offsets=rest.offsets,
             rest_shift=rest_shift,

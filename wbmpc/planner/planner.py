@@ -112,6 +112,7 @@ class Planner:
             sole_velocities=sole_velocity,
             hands=hands,
             posture=references.posture(),
+            torso_up=references.torso_up(),
         )
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
