@@ -158,6 +158,13 @@ def test_a_hop_has_no_stance_foot() -> None:
     assert not outside(run).passed
 
 
+def test_a_scuff_is_no_single_support() -> None:
+    run = lateral_run(0.04)
+    run.touch([60], FLOOR, LEFT_FOOT, [0.0, 0.0, 0.05 * WEIGHT])
+    run.com[60, 1] = 0.3
+    assert outside(run).value == pytest.approx(0.055)
+
+
 def test_a_turned_stance_foot_turns_its_rectangle() -> None:
     run = lateral_run(0.04)
     run.sole_yaw[:, 1] = np.pi / 2  # now 0.06 to the left, where it was 0.035

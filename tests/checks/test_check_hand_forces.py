@@ -120,6 +120,14 @@ def test_the_mean_over_10_ms_is_what_counts() -> None:
     assert caps(run).value == pytest.approx((20 + 4 * 2) / 5 - 5)
 
 
+@pytest.mark.parametrize(("tick", "passed"), [(129, True), (130, False), (149, False)])
+def test_the_first_mean_holds_no_force_of_the_impact(tick: int, passed: bool) -> None:
+    run = two_handed_run(left=2.0 / WEIGHT, right=2.0 / WEIGHT)
+    run.facts["timestep"] = 0.002  # the left palm touches from tick 30 to 149: 0.2 s are over at tick 130
+    run.touch([tick], WALL, LEFT_PALM, [0.0, -40.0, 0.0])
+    assert caps(run).passed == passed
+
+
 def test_no_hand_no_force() -> None:
     assert caps(SyntheticRun()).passed
 

@@ -83,7 +83,8 @@ class HandForceCapsCheck:
         mean = uniform_filter1d(context.push_along(code), width, axis=0, origin=(width - 1) // 2, mode="constant")
         excess = np.full(code.shape, -np.inf)
         for contact in hand_contacts(context):
-            judged = slice(contact.start + context.ticks(IMPACT_TIME), contact.stop)
+            # The first mean that is judged holds no force of the impact.
+            judged = slice(contact.start + context.ticks(IMPACT_TIME) + width - 1, contact.stop)
             excess[judged, contact.side] = (mean - caps[code])[judged, contact.side]
         tick, side = np.unravel_index(np.argmax(excess), excess.shape)
         if excess[tick, side] == -np.inf:
