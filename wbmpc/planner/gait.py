@@ -138,7 +138,9 @@ class Gait:
 
     # ------------------------------------------------------------------ over the horizon
 
-    def preview(self, time: float, times: Vector, *, rate: float, margin: float, growth: float, half_extents: Vector) -> SupportPreview:
+    def preview(
+        self, time: float, times: Vector, *, rate: float, margin: float, growth: float, half_extents: Vector
+    ) -> SupportPreview:
         """Support over the horizon.
 
         Args:
@@ -197,7 +199,7 @@ class Gait:
         feet, moved = self.feet, (-1, -1)
         steps: list[Footstep] = []
         made: tuple[int, ...] = ()
-        if self.phase == SupportPhase.STAND or self.step is None and self.swing is None:
+        if self.phase == SupportPhase.STAND or (self.step is None and self.swing is None):
             return [_Interval(NEVER, feet, -1, moved)], steps
         end = min(self._left / max(rate, 1e-6), NEVER)
         intervals: list[_Interval] = []
