@@ -1,4 +1,4 @@
-"""Stage 3 with the contacts given: what a force does to the feet's ZMP, and the forces at every knot ([M] eq. neweq)."""
+"""Stage 3 with the contacts given: what forces do to the feet's ZMP, and the forces at every knot ([M] eq. neweq)."""
 
 from __future__ import annotations
 
