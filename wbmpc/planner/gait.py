@@ -138,7 +138,9 @@ class Gait:
 
     # ------------------------------------------------------------------ over the horizon
 
-    def preview(self, time: float, times: Vector, *, rate: float, margin: float, growth: float, half_extents: Vector) -> SupportPreview:
+    def preview(
+        self, time: float, times: Vector, *, rate: float, margin: float, growth: float, half_extents: Vector
+    ) -> SupportPreview:
         """Support over the horizon.
 
         Args:

@@ -8,7 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from wbmpc.kinematics import Kinematics
-from wbmpc.planner.bands import height_band, horizontal_band
+from wbmpc.planner.bands import height_band
 from wbmpc.planner.com_height import ComHeightStage, HeightPlan
 from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contacts import NOT_RUN, Contacts
@@ -19,7 +19,6 @@ from wbmpc.planner.preview import Preview
 from wbmpc.planner.references import References
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.stepping import Stepping
-from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_of
@@ -93,7 +92,7 @@ class Planner:
         plane = polygon.plane_height
         mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
 
-        full_pace, _ = references.palms(state.time, contacts, full_pace=True)
+        full_pace, full_sigma = references.palms(state.time, contacts, full_pace=True)
         gated, sigma = references.palms(state.time, contacts, full_pace=False)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
@@ -102,7 +101,6 @@ class Planner:
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._palms)
-        reach_distance = references.reach_distance(contacts)
         soles, yaws, sole_velocity, sole_acceleration = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
@@ -116,13 +114,13 @@ class Planner:
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, reach: Vector
+            stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, com_band: Vector
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
                 self._com.value[:2],
                 zmp=zmp,
                 support=support,
-                com_band=horizontal_band(reach, reach_distance),
+                com_band=com_band,
                 tasks=tasks,
                 velocity_time=self._period,
                 urgency=urgency,
@@ -133,7 +131,7 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(self._need_stage, model, at_once, full_pace)
+            wish, _ = stage_2(self._need_stage, model, at_once, references.com_band(contacts, full_pace, full_sigma))
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
@@ -147,7 +145,9 @@ class Planner:
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(self._motion_stage, model, gated_support, gated)
+        motion, solution = stage_2(
+            self._motion_stage, model, gated_support, references.com_band(contacts, gated, sigma)
+        )
         stage2 = _stage_report(solution, begin)
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
@@ -212,7 +212,9 @@ class Planner:
             loads=state.sole_wrench_in_world[:, 2],
             events=events,
         )
-        references.advance(state.time, dt, gate_open=gate_open, palms=self._palms, events=events)
+        references.advance(
+            state.time, dt, gate_open=gate_open, palms=self._palms, com=self._measured.com, events=events
+        )
         contacts.advance(
             dt,
             palms=self._palms,
@@ -315,4 +317,3 @@ class Planner:
 
 def _stage_report(solution: QpSolution, start: float) -> StageReport:
     return StageReport(solution.status, perf_counter() - start, solution.iterations)
-
