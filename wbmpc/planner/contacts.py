@@ -6,10 +6,11 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.planner.candidates import Candidates
+from wbmpc.planner.candidates import COM_COST, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
+from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.zmp_model import need_at_rest
@@ -43,6 +44,7 @@ class Contacts:
         self._force_stage = ContactForce(
             len(times), contact, mass=robot.mass, contacts=len(SIDES), backend=settings.qp_backend
         )
+        self._together = Posture(robot, nominal=nominal, com_cost=COM_COST)
         self.forces = np.zeros((len(SIDES), len(times), 3))  # [N] planned, in world
         self._needed, self._quiet = False, True  # of the shift as a whole
         self._short = False  # the contacts there are cannot give it
@@ -71,12 +73,31 @@ class Contacts:
         patch = self.hands[side].patch
         return patch.name if patch else ""
 
-    def approach_com(self, side: int) -> Vector:
-        """CoM (3,) [m] of the posture that has this hand on its patch."""
-        contact = self.hands[side]
-        return next(c for c in self.candidates.all if c.patch is contact.patch and c.hand == side).posture.com
+    @property
+    def posture(self) -> Posture | None:
+        """The posture that has every hand with a contact on its patch and the CoM over the feet; None without one."""
+        placed = [c for c in self.hands if c.goal is not None]
+        if len(placed) == 1:
+            return next(
+                c for c in self.candidates.all if c.patch is placed[0].patch and c.hand == placed[0].side
+            ).posture
+        return self._together if placed else None
 
     # ------------------------------------------------------------------ one plan
+
+    def improve_postures(
+        self, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int, everyone: bool = False
+    ) -> None:
+        """Iterate the next candidate's posture (or everyone's) and the one with both hands on their patches.
+
+        Args:
+            soles, yaws: of the feet, (2, 3) [m] and (2,) [rad].
+            centre: (2,) where the CoM should rather be [m].
+        """
+        self.candidates.refresh(soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone)
+        palms = [c.goal for c in self.hands]
+        if all(palm is not None for palm in palms):
+            self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     def advance(self, dt: float, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
         """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N]."""

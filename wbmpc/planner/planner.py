@@ -96,7 +96,7 @@ class Planner:
         gated, sigma = references.palms(state.time, contacts, full_pace=False)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        height, solution = self._plan_height(references.wanted_height(state.time, sigma), band, plane)
+        height, solution = self._plan_height(references.wanted_height(state.time, contacts, sigma), band, plane)
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
@@ -109,7 +109,7 @@ class Planner:
             yaws=yaws,
             sole_velocities=sole_velocity,
             hands=hands,
-            posture=references.posture(),
+            posture=references.posture(contacts),
         )
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
@@ -228,9 +228,7 @@ class Planner:
         """Iterate the reach's posture and the next candidate's (or everyone's); `centre` (2,) is the support's [m]."""
         soles, yaws = self._gait.feet.positions, self._gait.feet.yaws
         self._references.update_goal(self._contacts, soles=soles, yaws=yaws, centre=centre, iterations=iterations)
-        self._contacts.candidates.refresh(
-            soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone
-        )
+        self._contacts.improve_postures(soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone)
 
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
         """Support at full pace and at the gate's, its inset smaller the louder the alarm."""

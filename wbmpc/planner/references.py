@@ -116,25 +116,26 @@ class References:
         return references, sigma
 
     def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector) -> Vector:
-        """Where the horizontal CoM may be (2, N, 2) [m]: within d of every palm, and of a lean's way; see `bands`.
+        """Where the horizontal CoM may be (2, N, 2) [m]: within d of every palm, and close to a lean's way; see `bands`.
 
         Args:
             palms, sigma: what `palms` answered, (2, N, 3) [m] and (N,).
         """
+        band = horizontal_band(palms, self._reach_distance(contacts))
         lean = self._leaning
         if lean is None:
-            return horizontal_band(palms, self._reach_distance(contacts))
-        way = lean.preview(sigma, home=self._centre)
-        if not lean.progress.active:
-            way[sigma == 0.0] = np.nan  # nobody asks where the CoM is before it starts
-        ends = np.concatenate([palms[:, :, :2], way[None]])
-        return horizontal_band(ends, np.vstack([self._reach_distance(contacts), [LEAN_BAND, LEAN_BAND]]))
+            return band
+        way = lean.preview(sigma, home=self._centre).T  # (2, N)
+        way = np.clip(way, band[:, :, 0], band[:, :, 1])  # hands first: what they touch is what lets the CoM go on
+        asked = lean.progress.active | (sigma > 0.0)  # before it starts nobody asks where the CoM is
+        return np.where(asked[:, None], way[:, :, None] + [-LEAN_BAND, LEAN_BAND], band)
 
-    def wanted_height(self, time: float, sigma: Vector) -> Vector:
-        """CoM height (N,) to stay near [m]: a height task's profile, else the task's posture by its progress."""
-        wanted = np.full(len(self._times), self._nominal_height)
+    def wanted_height(self, time: float, contacts: Contacts, sigma: Vector) -> Vector:
+        """CoM height (N,) to stay near [m]: a height task's profile, else that of the postures of contacts and task."""
+        base = contacts.posture.com[2] if contacts.posture is not None else self._nominal_height
+        wanted = np.full(len(self._times), base)
         if self._current:
-            wanted += sigma * (self._goal.com[2] - self._nominal_height)
+            wanted += sigma * (self._goal.com[2] - base)
         for task in self._heights:
             knots = [0.0] + [w.time for w in task.waypoints]
             heights = [self._nominal_height] + [w.height for w in task.waypoints]
@@ -146,10 +147,10 @@ class References:
 
         The paper takes d as a constant of the robot; the posture makes it the constant of this target and this stance.
         """
-        distance = np.full((len(SIDES), 2), UNBOUNDED)
+        distance, braced = np.full((len(SIDES), 2), UNBOUNDED), contacts.posture
         for contact in contacts.hands:
-            if contact.goal is not None:
-                distance[contact.side] = np.abs(contact.goal[:2] - contacts.approach_com(contact.side)[:2])
+            if contact.goal is not None and braced is not None:
+                distance[contact.side] = np.abs(contact.goal[:2] - braced.com[:2])
                 if self._current:
                     with_task = np.abs(contact.goal[:2] - self._goal.com[:2])
                     distance[contact.side] = np.maximum(distance[contact.side], with_task)
@@ -160,10 +161,11 @@ class References:
 
     # ------------------------------------------------------------------ now
 
-    def posture(self) -> Vector:
-        """Joint angles (nj,) that the joint reference is drawn to: standing, or the task's posture by its progress."""
+    def posture(self, contacts: Contacts) -> Vector:
+        """Joint angles (nj,) that the joint reference is drawn to: standing or braced, the task's by its progress."""
+        base = contacts.posture.q if contacts.posture is not None else self._nominal
         sigma = max((task.progress.sigma for task in self._current), default=0.0)
-        return self._nominal[7:] + sigma * (self._goal.q[7:] - self._nominal[7:])
+        return base[7:] + sigma * (self._goal.q[7:] - base[7:])
 
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
