@@ -83,7 +83,9 @@ def test_two_hands_share_the_load() -> None:
 def test_choice_and_forces_are_the_same_problem() -> None:
     """At fixed H both write the same cost: same forces where the polygon does not bind."""
     need = lean(0.02)
-    chosen = ContactChoice(2, SETTINGS, mass=MASS, backend="daqp").solve(need, [Option(TABLE, 1)])
+    chosen = ContactChoice(2, SETTINGS, mass=MASS, backend="daqp").solve(
+        need, [Option(TABLE, 1)], left=np.array([0.0, 1.0])
+    )
     given_all = ContactForce(KNOTS, SETTINGS, mass=MASS, contacts=1, backend="daqp")
     forces, _ = given_all.solve(need, [TABLE], np.full((1, KNOTS), TABLE.force_cap))
     assert forces is not None

@@ -50,6 +50,7 @@ class Candidates:
             for hand in range(len(SIDES))
         ]
         self._turn = 0
+        self._left = np.array([0.0, 1.0])  # unit, to the robot's left
         self._backend = backend
         slots = min(len(self.all), settings.most_candidates)
         self._choice = ContactChoice(slots, settings, mass=robot.mass, backend=backend) if slots else None
@@ -63,6 +64,8 @@ class Candidates:
             return
         turn = self.all if everyone else [self.all[self._turn % len(self.all)]]
         self._turn += 1
+        heading = float(np.mean(yaws))
+        self._left = np.array([-np.sin(heading), np.cos(heading)])
         for candidate in turn:
             palms: list[Vector | None] = [None, None]
             palms[candidate.hand] = candidate.goal(self._robot.palm_radius)
@@ -101,7 +104,7 @@ class Candidates:
         winners: list[Candidate] = []
         best, stage = np.inf, StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
         if options:
-            choice = self._choice.solve(need, [*held, *options])
+            choice = self._choice.solve(need, [*held, *options], left=self._left)
             stage = StageReport(choice.solution.status, choice.solution.solve_time, choice.solution.iterations)
             winners, best = [considered[i - len(held)] for i in choice.winners], choice.objective
         weighed = {id(c): option for c, option in zip(considered, options, strict=True)}
@@ -132,7 +135,7 @@ class Candidates:
         """Stage 3's objective with these contacts and no other; inf when they cannot give what is needed."""
         if self._given is None or not contacts:
             return np.inf
-        return self._given.solve(need, [replace(contact, held=True) for contact in contacts]).objective
+        return self._given.solve(need, [replace(contact, held=True) for contact in contacts], left=self._left).objective
 
     def _sort_out(
         self, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon
@@ -159,10 +162,8 @@ class Candidates:
     def _cost_of(self, need: Need, option: Option, company: list[Option]) -> tuple[float, Vector]:
         """Objective with this option taken beside `company`, prices included, and its forces (KNOTS, 3) [N]."""
         assert self._given is not None
-        if any(other.patch is option.patch for other in company):
-            return np.inf, np.zeros((ContactChoice.KNOTS, 3))
         together = [replace(other, held=True) for other in (option, *company)]
-        answer = self._given.solve(need, together)
+        answer = self._given.solve(need, together, left=self._left)
         price = option.price + sum(other.price for other in company if not other.held)
         return answer.objective + price, answer.forces[0]
 
@@ -175,7 +176,7 @@ def _reason(candidate: Candidate, cost: float, *, best: float, winners: list[Can
         return "patch is taken by the other hand"
     if np.isfinite(cost):
         return f"cost {cost - best:.3g} above the best"
-    return "no force in its cone gives the shift" + (", even beside the others" if company else "")
+    return "does not do beside the others" if company else "no force in its cone gives the shift"
 
 
 def _friction_margin(patch: PatchPose, forces: Vector) -> float:

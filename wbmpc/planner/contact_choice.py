@@ -22,6 +22,8 @@ from wbmpc.qp import QpSolution, QuadraticProgram, make_mip_workspace
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SIDES, SolveStatus, Vector
 
+CROSSING_GAP = 0.05  # [m] by which the left hand's contact is to the left of the right hand's
+
 
 @dataclass(frozen=True, slots=True)
 class Option:
@@ -49,7 +51,9 @@ class ContactChoice:
     subject to  n_i·f_i ≤ f_max H_i  (big-M: the force cap),  f_i in its friction cone,
                 Σ_i P f_i ≤ q          the feet's ZMP inside the support polygon,
                 1 ≤ Σ_i H_i ≤ most,    H_i = 1 for a contact that is held,
-                Σ H_i ≤ 1              over the options of one hand, and over those of one patch.
+                Σ H_i ≤ 1              over the options of one hand, and over those of one patch,
+                y_i ≥ y_j + gap        when H_i = H_j = 1, i of the left hand, j of the right, y to the left (big-M):
+                                       arms that cross would run into each other.
 
     The paper takes ΣH = 1; here several contacts share what is needed, and one that is held can be joined by another.
     A further contact pays its own w_i: it is taken when those before it cannot give what is needed, or when sharing the
@@ -65,8 +69,10 @@ class ContactChoice:
         self._options, self._settings, self._mass = options, settings, mass
         self._forces = 3 * self.KNOTS * options
         self._knot_rows = 2 + MAX_EDGES
-        self._sums = self.KNOTS * self._knot_rows + options * self.KNOTS * 5  # first of: count, hands, shared patches
-        rows = self._sums + 1 + len(SIDES) + options // 2
+        self._sums = (
+            self.KNOTS * self._knot_rows + options * self.KNOTS * 5
+        )  # first of: count, crossing, hands, patches
+        rows = self._sums + 2 + len(SIDES) + options // 2
         soft = np.zeros(rows)
         for knot in range(self.KNOTS):
             # the equality is in N m; the slack's price is per metre of shift
@@ -77,8 +83,12 @@ class ContactChoice:
         self.problem = QuadraticProgram(self._forces + options, rows, soft_weight=soft, binary=binary)
         self._workspace = make_mip_workspace(backend, self.problem)
 
-    def solve(self, need: Need, options: Sequence[Option]) -> Choice:
-        """Choose among `options` (at most as many as built for) for a need of KNOTS knots."""
+    def solve(self, need: Need, options: Sequence[Option], *, left: Vector) -> Choice:
+        """Choose among `options` (at most as many as built for) for a need of KNOTS knots.
+
+        Args:
+            left: (2,) unit vector to the robot's left.
+        """
         qp, forces, slots = self.problem, self._forces, self._options
         qp.matrix[:] = 0.0
         qp.gradient[:] = 0.0
@@ -97,7 +107,7 @@ class ContactChoice:
         unused = 3 * self.KNOTS * len(options)
         qp.x_lower[unused:forces] = qp.x_upper[unused:forces] = 0.0
         qp.x_upper[forces + len(options) :] = 0.0
-        self._fill_sums(options)
+        self._fill_sums(options, left)
         solution = self._workspace.solve()
         if solution.status != SolveStatus.SOLVED:
             return Choice((), np.zeros((len(options), self.KNOTS, 3)), np.inf, solution)
@@ -128,15 +138,21 @@ class ContactChoice:
             qp.matrix[row + 4, columns] = patch.normal
             qp.matrix[row + 4, binary] = -patch.force_cap
 
-    def _fill_sums(self, options: Sequence[Option]) -> None:
-        """Rows over the binaries: how many contacts, one patch a hand, one hand a patch."""
+    def _fill_sums(self, options: Sequence[Option], left: Vector) -> None:
+        """Rows over the binaries: how many contacts, arms that do not cross, one patch a hand, one hand a patch."""
         qp, first, binaries = self.problem, self._sums, slice(self._forces, self._forces + len(options))
         qp.matrix[first, binaries] = 1.0
         qp.lower[first], qp.upper[first] = 1.0, self._settings.most_contacts
+        # Σ_left (y − M) H − Σ_right (y + M) H ≥ gap − 2 M says nothing unless both hands are taken
+        across = np.array([option.patch.position[:2] @ left for option in options])
+        big = float(np.abs(across).max(initial=0.0)) + CROSSING_GAP
+        signs = np.array([1.0 if option.hand == 0 else -1.0 for option in options])
+        qp.matrix[first + 1, binaries] = signs * across - big
+        qp.lower[first + 1], qp.upper[first + 1] = CROSSING_GAP - 2.0 * big, np.inf
         of_hand = [[option.hand == side for option in options] for side in range(len(SIDES))]
         patches = {id(option.patch): option.patch for option in options}.values()
         of_patch = [[option.patch is patch for option in options] for patch in patches]
         groups = of_hand + [members for members in of_patch if sum(members) > 1]
-        for row, members in enumerate(groups, start=first + 1):
+        for row, members in enumerate(groups, start=first + 2):
             qp.matrix[row, binaries] = members
             qp.upper[row] = 1.0

@@ -116,7 +116,7 @@ class References:
         return references, sigma
 
     def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector) -> Vector:
-        """Where the horizontal CoM may be (2, N, 2) [m]: within d of every palm, and close to a lean's way; see `bands`.
+        """Where the horizontal CoM may be (2, N, 2) [m]: within d of every palm, and near a lean's way; see `bands`.
 
         Args:
             palms, sigma: what `palms` answered, (2, N, 3) [m] and (N,).
