@@ -97,6 +97,7 @@ class ContactSettings(StrictModel):
     shift_slack_cost: float = Field(1.0, gt=0, description="[cost / m²] price of a ΔZ that the force does not give")
     distance_cost: float = Field(0.4, ge=0, description="[cost / m] w_i per metre between the hand and candidate i")
     reach_margin: float = Field(0.005, ge=0, description="[m] IK residual up to which a candidate counts as reachable")
+    most_contacts: int = Field(2, ge=1, le=2, description="hands in contact at once, the paper's ΣH: 1 or 2")
     most_candidates: int = Field(16, ge=1, le=64, description="candidates that one firing considers, nearest first")
 
 
