@@ -68,7 +68,7 @@ class Planner:
         )
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._palms = np.array([measured.position(f) for f in robot.palm_frames])
-        self._palm_homes = self._palms.copy()
+        self._palm_homes = self._in_torso(self._palms)  # where free hands hang
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
@@ -197,6 +197,14 @@ class Planner:
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
 
+    def _in_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return (points - self._measured.position(frame)) @ self._measured.rotation(frame)
+
+    def _from_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return self._measured.position(frame) + points @ self._measured.rotation(frame).T
+
     def _measured_soles(self) -> Vector:
         return np.array([self._measured.position(f) for f in self._robot.sole_frames])
 
@@ -226,7 +234,7 @@ class Planner:
             dt,
             palms=self._palms,
             palm_forces=state.palm_force_in_world,
-            homes=self._palm_homes,
+            homes=self._from_torso(self._palm_homes),
             events=events,
         )
         self._improve_postures(iterations=2)
