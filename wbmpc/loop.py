@@ -16,7 +16,7 @@ from wbmpc.planner.planner import Planner
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
-from wbmpc.scenario import Scenario, build_world, resolve_patches
+from wbmpc.scenario import Scenario, build_world, resolve_obstacles, resolve_patches
 from wbmpc.signals import RobotState, Vector
 from wbmpc.tracker.tracker import Tracker
 
@@ -73,6 +73,7 @@ class Session:
             scenario.planner,
             tasks=scenario.tasks,
             patches=resolve_patches(scenario),
+            obstacles=resolve_obstacles(scenario),
             q=q,
             period=loop.planner_period_ticks * self.step,
         )
