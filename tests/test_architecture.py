@@ -53,9 +53,10 @@ ALLOWED = {
     "counterfactuals": SETTINGS | {"verdict", "counterfactuals"},
     "session": LOOP | {"checks", "facts", "metrics", "verdict", "versions", "rerun_sink", "realtime", "session"},
     "sweep_journal": BASE | {"sweep_journal"},
-    "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "sweep"},
+    "pool": {"pool"},
+    "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "pool", "sweep"},
     "commands": None,  # anything
-    "cli": {"commands", "scenario", "versions", "cli"},
+    "cli": {"commands", "scenario", "versions", "pool", "cli"},
     "__main__": {"cli", "__main__"},
 }
 

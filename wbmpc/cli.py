@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from wbmpc.commands.exits import ExitCode, guarded
+from wbmpc.pool import one_thread_each
 
 app = typer.Typer(
     add_completion=False,
@@ -30,6 +31,7 @@ Overrides = Annotated[
         show_default=False,
     ),
 ]
+Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Parallel processes [one per core].")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
 
 
@@ -55,6 +57,7 @@ def _options(
     ] = False,
 ) -> None:
     """Options before the command."""
+    one_thread_each()  # before any command imports numpy
 
 
 @app.command("run", help="Run scenarios; write DIR/NAME.rrd, DIR/NAME.json and DIR/junit.xml.")
@@ -68,6 +71,7 @@ def run_command(
     counterfactuals: Annotated[
         bool, typer.Option("--counterfactuals", help="Also run each scenario's counterfactuals.")
     ] = False,
+    jobs: Jobs = None,
     debug: Debug = False,
 ) -> None:
     def work() -> ExitCode:
@@ -81,6 +85,7 @@ def run_command(
             realtime=realtime,
             record=not no_record,
             counterfactuals=counterfactuals,
+            jobs=jobs,
             debug=debug,
         )
         return run(scenarios, options)
@@ -113,7 +118,7 @@ def sweep_command(
     scenario: ScenarioFile,
     overrides: Overrides,
     draws: Annotated[int, typer.Option("--draws", min=1, help="Number of draws.", show_default=False)],
-    jobs: Annotated[int | None, typer.Option(min=1, help="Parallel processes [one per core].")] = None,
+    jobs: Jobs = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws.")] = 0,
     min_rate: Annotated[
         float, typer.Option(min=0, max=1, help="Smallest share of passed draws for exit code 0.")
