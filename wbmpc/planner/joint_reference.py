@@ -61,6 +61,7 @@ class JointReference:
         vertical_velocity: float,
         soles: Vector,
         yaws: Vector,
+        sole_velocities: Vector,
         hands: list[tuple[Vector, Vector, HandMode]],
         posture: Vector,
     ) -> VelocityTasks:
@@ -69,7 +70,8 @@ class JointReference:
         Args:
             com: planned CoM (3,) now [m].
             vertical_velocity: stage 1's ċ_z [m/s].
-            soles, yaws: where the stance feet are, (2, 3) [m] and (2,) [rad].
+            soles, yaws: where the feet are or should be in their swing, (2, 3) [m] and (2,) [rad].
+            sole_velocities: (2, 3) [m/s].
             hands: position [m], velocity [m/s] (3,) and mode of each hand.
             posture: (nj,) joint angles to be drawn to [rad].
         """
@@ -84,7 +86,9 @@ class JointReference:
             level = level_frame(yaws[side])
             rows = slice(6 * side, 6 * side + 6)
             foot_jacobian[rows] = kinematics.jacobian(frame)
-            foot_velocity[6 * side : 6 * side + 3] = rate * (soles[side] - kinematics.position(frame))
+            foot_velocity[6 * side : 6 * side + 3] = sole_velocities[side] + rate * (
+                soles[side] - kinematics.position(frame)
+            )
             foot_velocity[6 * side + 3 : 6 * side + 6] = rate * rotation_error(
                 desired=level, measured=kinematics.rotation(frame)
             )

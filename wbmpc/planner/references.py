@@ -7,8 +7,6 @@ import numpy as np
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.reach import Reach, ReachPhase
-from wbmpc.planner.settings import HeightSettings
-from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
 from wbmpc.scenario import ComHeightTask, ReachTask, Task
 from wbmpc.signals import SIDES, HandMode, Vector
@@ -143,19 +141,6 @@ class References:
     def progress(self) -> float:
         """Rate of the slowest reach's clock, 0 … 1."""
         return min((r.rate for r in self.reaches), default=1.0)
-
-
-def height_band(settings: HeightSettings, references: Vector, polygon: SupportPolygon) -> Vector:
-    """Admissible band (N, 2) of the CoM height [m]: the legs' range, narrowed by |c_z − r_z| ≤ d of the hands.
-
-    `references` (2, N, 3) are palm references, nan for a free hand ([M] eq. QP1).
-    """
-    z = references[:, :, 2]
-    low = np.fmax.reduce(z - settings.reach, axis=0)
-    high = np.fmin.reduce(z + settings.reach, axis=0)
-    plane = polygon.plane_height
-    low, high = np.fmax(low, plane + settings.lowest), np.fmin(high, plane + settings.highest)
-    return np.column_stack([low, high])
 
 
 def _hand_of(task: ReachTask, palms: Vector) -> int:

@@ -9,7 +9,17 @@ from wbmpc.scenario.schema.experiments import Counterfactual, Sweep, Variation
 from wbmpc.scenario.schema.loop import InitialState, LoopSettings, RecordingSettings
 from wbmpc.scenario.schema.plant import Disturbance, Impulse, PlantSettings, SensorSettings
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import ComHeightTask, HeightWaypoint, ReachTask, StandTask, Task
+from wbmpc.scenario.schema.tasks import (
+    ComHeightTask,
+    GoTask,
+    HeightWaypoint,
+    ReachTask,
+    StandTask,
+    StepTask,
+    Task,
+    VelocityCommand,
+    WalkTask,
+)
 from wbmpc.scenario.schema.world import Box, Floor, Patch, World
 from wbmpc.scenario.world import build_world
 
@@ -19,6 +29,7 @@ __all__ = [
     "Counterfactual",
     "Disturbance",
     "Floor",
+    "GoTask",
     "HeightWaypoint",
     "Impulse",
     "InitialState",
@@ -31,9 +42,12 @@ __all__ = [
     "Scenario",
     "SensorSettings",
     "StandTask",
+    "StepTask",
     "Sweep",
     "Task",
     "Variation",
+    "VelocityCommand",
+    "WalkTask",
     "World",
     "apply_overrides",
     "build_world",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator
 
@@ -11,7 +10,8 @@ from wbmpc.scenario.diagnosis import Finding
 from wbmpc.scenario.patches import FACES
 from wbmpc.scenario.robot_file import RobotNames
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import ComHeightTask, ReachTask, StandTask
+from wbmpc.scenario.schema.tasks import ReachTask
+from wbmpc.scenario.task_consistency import find_task_inconsistencies
 from wbmpc.scenario.wording import KeyPath, describe, near_misses
 
 FLOOR = "floor"
@@ -19,7 +19,13 @@ FLOOR = "floor"
 
 def find_inconsistencies(scenario: Scenario) -> list[Finding]:
     """Every contradiction between the fields of one scenario; counterfactuals and sweep are looked at elsewhere."""
-    return [*_objects_and_patches(scenario), *_times(scenario), *_rates(scenario), *_checks(scenario)]
+    return [
+        *_objects_and_patches(scenario),
+        *_times(scenario),
+        *find_task_inconsistencies(scenario),
+        *_rates(scenario),
+        *_checks(scenario),
+    ]
 
 
 def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Finding]:
@@ -72,32 +78,10 @@ def _times(scenario: Scenario) -> Iterator[Finding]:
     if horizon > scenario.duration:
         message = f"the horizon of {horizon:g} s is longer than the run of {scenario.duration:g} s"
         yield Finding(("planner", "horizon_steps"), message)
-    for index, task in enumerate(scenario.tasks):
-        path: KeyPath = ("tasks", index)
-        if isinstance(task, StandTask):
-            continue
-        if isinstance(task, ReachTask) and task.arrive_by <= task.start:
-            message = f"must be later than start ({task.start:g} s), got {task.arrive_by:g} s"
-            yield Finding((*path, "arrive_by"), message)
-        elif isinstance(task, ComHeightTask):
-            yield from _waypoint_order(path, task)
-        if task.end > scenario.duration:
-            yield Finding(path, f"ends at {task.end:g} s, the run already at {scenario.duration:g} s (duration)")
-    heights = [index for index, task in enumerate(scenario.tasks) if isinstance(task, ComHeightTask)]
-    if len(heights) > 1:
-        yield Finding(("tasks", heights[1]), f"a second com_height task, first is tasks.{heights[0]}")
     for index, disturbance in enumerate(scenario.disturbances):
         if disturbance.end > scenario.duration:
             message = f"ends at {disturbance.end:g} s, the run already at {scenario.duration:g} s (duration)"
             yield Finding(("disturbances", index, "time"), message)
-
-
-def _waypoint_order(path: KeyPath, task: ComHeightTask) -> Iterator[Finding]:
-    times = [waypoint.time for waypoint in task.waypoints]
-    for index, (before, after) in enumerate(itertools.pairwise(times), start=1):
-        if after <= before:
-            message = f"must be later than the waypoint before it ({before:g} s), got {after:g} s"
-            yield Finding((*path, "waypoints", index, "time"), message)
 
 
 def _rates(scenario: Scenario) -> Iterator[Finding]:

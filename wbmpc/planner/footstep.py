@@ -1,0 +1,37 @@
+"""One footstep: which foot goes where, and how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from wbmpc.signals import Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Footstep:
+    """A place for a foot, before stage 2 has moved it."""
+
+    side: int  # which foot goes
+    position: Vector  # (3,) [m] sole centre in world
+    yaw: float  # [rad]
+    swing_time: float  # [s]
+    double_support: float  # [s] before the foot is lifted, when it follows another step
+    clearance: float  # [m] how high the foot is lifted
+    lead: float  # share of the swing in which the foot only rises, and at its end only sinks: 0 … 0.4
+    adaptable: bool  # whether stage 2 may move it
+    task: int  # index of the task that asks for it
+
+
+@dataclass(frozen=True, slots=True)
+class Feet:
+    """Where both feet stand, or will stand; the steps are planned from this."""
+
+    positions: Vector  # (2, 3) [m] sole centres in world
+    yaws: Vector  # (2,) [rad]
+    last: int  # side of the foot that moved last; -1 when none has
+
+    def after(self, step: Footstep) -> Feet:
+        """The feet when `step` has been made."""
+        positions, yaws = self.positions.copy(), self.yaws.copy()
+        positions[step.side], yaws[step.side] = step.position, step.yaw
+        return Feet(positions, yaws, step.side)
