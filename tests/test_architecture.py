@@ -41,6 +41,7 @@ ALLOWED = {
     "footage": RECORDS | {"footage"},
     "render": RECORDS | {"footage", "render"},
     "rerun_sink": RECORDS | {"footage", "rerun_sink"},
+    "figures": RECORDS | {"footage", "render", "rerun_sink", "figures"},
     "checks": RECORDS | ROBOT | {"settings", "checks"},
     "mailbox": BASE | {"planner", "mailbox"},
     "loop": LOOP,

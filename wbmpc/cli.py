@@ -169,3 +169,28 @@ def render_command(
         return render(recording, target, options)
 
     raise typer.Exit(guarded(work, traceback_path=Path("out/render.traceback.txt"), debug=debug))
+
+
+@app.command("plot", help="Draw recordings (.rrd): a strip of key moments, and balance, hand forces and footsteps.")
+def plot_command(
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="The .rrd files.", show_default=False)],
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder [beside the recording].")] = None,
+    suffix: Annotated[str, typer.Option("--format", help="webp, png, or pdf, svg with the strip as webp.")] = "webp",
+    frames: Annotated[int, typer.Option(min=0, max=20, help="Pictures of the strip; 0: no strip.")] = 6,
+    width: Annotated[int, typer.Option(min=16, max=2048, help="[px] of each picture.")] = 210,
+    height: Annotated[int, typer.Option(min=16, max=2048, help="[px]")] = 270,
+    azimuth: Annotated[
+        float | None, typer.Option(help="[deg] direction of view about z: 90 along +y [what shows the motion best].")
+    ] = None,
+    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.05,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.plot import PlotOptions, plot
+
+        options = PlotOptions(
+            out=out, suffix=suffix, frames=frames, size=(width, height), azimuth=azimuth, distance=distance
+        )
+        return plot(recordings, options)
+
+    raise typer.Exit(guarded(work, traceback_path=Path("out/plot.traceback.txt"), debug=debug))
