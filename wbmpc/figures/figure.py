@@ -11,9 +11,10 @@ import numpy as np
 mpl.use("Agg")  # no screen
 from matplotlib.figure import Figure
 
+from wbmpc.checks.stretches import stretches
 from wbmpc.errors import WbmpcError
 from wbmpc.figures.panels import FAULT, HANDS, Panel, panels_of
-from wbmpc.figures.trace import Trace, stretches
+from wbmpc.figures.trace import Trace
 
 WIDTH = 9.5  # [in]
 PANEL_HEIGHT = 1.5  # [in]

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wbmpc.figures.trace import TOUCH, Trace, stretches
+from wbmpc.checks.stretches import stretches
+from wbmpc.figures.trace import TOUCH, Trace
 from wbmpc.rerun_sink import palette
 from wbmpc.signals import SIDES
 

@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.checks.stretches import joined
 from wbmpc.footage import Footage
 from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
 from wbmpc.rerun_sink.reading import Recording
@@ -17,7 +18,7 @@ from wbmpc.signals import SIDES
 
 FloatArray = NDArray[np.float64]
 TOUCH = 0.3  # [N] lighter touches of a palm are no contact
-LEAST_GAP = 0.5  # [s] between two contacts of a hand
+LEAST_GAP = 0.5  # [s] between two contacts of a hand: a palm that settles bounces a little
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,32 +97,17 @@ def trace_of(recording: Recording, footage: Footage) -> Trace:
     )
 
 
-def stretches(active: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """[start, stop) of every run of true entries in `active` (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
 def _hand_contacts(recording: Recording, time: FloatArray, force: FloatArray) -> Iterator[HandContact]:
+    spacing = float(time[-1] - time[0]) / max(1, len(time) - 1)
+    gap = round(LEAST_GAP / spacing) if spacing > 0 else 1
     for side, name in enumerate(SIDES):
         stamps, states = recording.column(f"/contact_phase/{name}", "state")
         words = [str(state[0]) if len(state) else "" for state in states]
-        for first, stop in _without_gaps(stretches(force[:, side] > TOUCH), time):
+        for first, stop in joined(force[:, side] > TOUCH, gap):
             start, end = float(time[first]), float(time[stop - 1])
             latest = int(np.searchsorted(stamps, 0.5 * (start + end), side="right")) - 1
             patch = words[latest].partition("(")[2].rstrip(")") if latest >= 0 else ""
             yield HandContact(side, start, end, patch)
-
-
-def _without_gaps(found: list[tuple[int, int]], time: FloatArray) -> list[tuple[int, int]]:
-    """The stretches, those less than `LEAST_GAP` apart joined: a palm that settles bounces a little."""
-    joined: list[tuple[int, int]] = []
-    for first, stop in found:
-        if joined and time[first] - time[joined[-1][1] - 1] < LEAST_GAP:
-            joined[-1] = (joined[-1][0], stop)
-        else:
-            joined.append((first, stop))
-    return joined
 
 
 def _pushes(recording: Recording, time: FloatArray) -> FloatArray:

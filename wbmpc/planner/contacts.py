@@ -53,7 +53,7 @@ class Contacts:
     def gate_open(self) -> bool:
         """Whether tasks may go on: no contact is needed, or it carries its load, or none can help."""
         carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self.hands)
-        return carried or not self._needed or self._hopeless >= GIVE_UP_TIME
+        return carried or not self._needed or self._hopeless >= GIVE_UP_TIME or not self.candidates.all
 
     @property
     def points(self) -> list[Vector | None]:

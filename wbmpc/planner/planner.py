@@ -19,7 +19,6 @@ from wbmpc.planner.preview import Preview
 from wbmpc.planner.references import References
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.stepping import Stepping
-from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_of
@@ -112,6 +111,7 @@ class Planner:
             sole_velocities=sole_velocity,
             hands=hands,
             posture=references.posture(),
+            torso_up=references.torso_up(),
         )
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
@@ -315,4 +315,3 @@ class Planner:
 
 def _stage_report(solution: QpSolution, start: float) -> StageReport:
     return StageReport(solution.status, perf_counter() - start, solution.iterations)
-

@@ -112,6 +112,12 @@ class References:
         sigma = max((r.sigma for r in self.reaches), default=0.0)
         return self._nominal[7:] + sigma * (self._goal.q[7:] - self._nominal[7:])
 
+    def torso_up(self) -> Vector:
+        """Where the torso's own vertical should point (3,), in world: up, or as in the reach's posture."""
+        sigma = max((r.sigma for r in self.reaches), default=0.0)
+        up = np.array([0.0, 0.0, 1.0])
+        return up + sigma * (self._goal.torso_up - up) if sigma > 0.0 else up
+
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
         taken = [r.side for r in self.reaches if r.phase != ReachPhase.DONE]
