@@ -14,6 +14,7 @@ from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.footholds import Footholds
+from wbmpc.planner.footstep import Feet
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.plan import Plan
@@ -31,6 +32,7 @@ from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotSta
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
+STRIDE_ITERATIONS = 50  # when a stride is asked for: half-finished postures would call for contacts
 
 
 class Planner:
@@ -67,6 +69,7 @@ class Planner:
         measured.update_kinematics(q)
         stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
         self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
+        self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._palms = np.array([measured.position(f) for f in robot.palm_frames])
         self._palm_homes = self._in_torso(self._palms)  # where free hands hang
@@ -242,7 +245,9 @@ class Planner:
             homes=self._from_torso(self._palm_homes),
             events=events,
         )
-        self._improve_postures(iterations=2)
+        asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
+        fresh = self._asked is not None and self._asked is not asked  # a stride from where the feet have not stood yet
+        self._improve_postures(iterations=STRIDE_ITERATIONS if fresh else 2)
 
     def _improve_postures(self, *, iterations: int, everyone: bool = False) -> None:
         """Iterate the tasks' postures and the next candidate's (or everyone's)."""
