@@ -30,7 +30,7 @@ ALLOWED = {
     "model_contract": ROBOT,
     "robot": ROBOT,
     "kinematics": ROBOT,
-    "settings": BASE,  # every settings.py: what a scenario may write for the package that it stands in
+    "settings": BASE | {"settings"},  # every settings.py: what a scenario may write for the package that it stands in
     "scenario": ROBOT | SETTINGS,
     "plant": ROBOT | SETTINGS | {"plant"},  # knows nothing of the controller
     "estimator": ROBOT | SETTINGS | {"estimator"},
@@ -63,7 +63,7 @@ ALLOWED = {
 def component(module: str) -> str:
     """`wbmpc.planner.preview` -> planner; every settings module -> settings."""
     parts = module.split(".")
-    if parts[-1] == "settings":
+    if "settings" in parts:
         return "settings"
     return parts[1] if len(parts) > 1 else "__init__"
 

@@ -247,6 +247,44 @@ MISTAKES = [
         "checks.1.allowed.0: no patch 'rigt', did you mean 'right'?",
     ),
     (
+        "check of a task that is not there",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: arrived, tolerance: 0.03}"),
+        "arrived",
+        "checks.1.kind: needs a go task or a target",
+    ),
+    (
+        "check of the other foot",
+        second_task("{kind: step, foot: left, target: [0.1, 0.05]}").replace(
+            "{kind: contact_patches, allowed: [right]}", "{kind: foot_moved, foot: right, tolerance: 0.03}"
+        ),
+        "foot_moved",
+        "checks.1.kind: needs a step task of the right foot or a target",
+    ),
+    (
+        "window after the end",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: footsteps, min_count: 1, window: [2.0, 12.5]}"),
+        "[2.0, 12.5]",
+        "checks.1.window: ends at 12.5 s, the run already at 12 s (duration)",
+    ),
+    (
+        "window backwards",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: footsteps, min_count: 1, window: [2.0, 1.5]}"),
+        "{kind: footsteps",
+        "checks.1: 'window' needs its beginning first, got [2, 1.5]",
+    ),
+    (
+        "travels nowhere in particular",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: travelled, window: [1.0, 2.0]}"),
+        "{kind: travelled",
+        "checks.1: needs at least one of 'forward', 'left' and 'turned'",
+    ),
+    (
+        "range upside down",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: travelled, forward: [0.6, 0.5]}"),
+        "{kind: travelled",
+        "checks.1: 'forward' needs its lower bound first, got [0.6, 0.5]",
+    ),
+    (
         "unknown robot",
         edited("robot: tiny.xml", "robot: tin.xml"),
         "tin.xml",

@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.checks import settings
-from wbmpc.checks.context import CheckContext
+from wbmpc.checks.context import CONTACT_FORCE, CheckContext
 from wbmpc.checks.result import CheckResult, at_least, at_most, failed, first_time
-
-CONTACT_FORCE = 0.3  # [N] lighter touches of a palm do not count as a contact made; the palms' sensing threshold
 
 
 class CompletedCheck:
@@ -50,7 +48,7 @@ class NoFallCheck:
 
 
 class UprightAtEndCheck:
-    """min of the torso's cosine over the last stretch, in which the CoM hardly moves and no hand helps."""
+    """min of the torso's cosine over the last stretch, in which the CoM hardly moves."""
 
     def __init__(self, config: settings.UprightAtEnd) -> None:
         self.config = config

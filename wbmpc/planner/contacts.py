@@ -61,7 +61,8 @@ class Contacts:
             return True
         awaited = any(c.busy and c.expected for c in self.hands)
         carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self.hands)
-        return (carried or self._hopeless >= GIVE_UP_TIME) and not awaited
+        helpless = self._hopeless >= GIVE_UP_TIME or not self.candidates.all
+        return (carried or helpless) and not awaited
 
     @property
     def points(self) -> list[Vector | None]:

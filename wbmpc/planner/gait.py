@@ -155,6 +155,7 @@ class Gait:
         shift, rest_shift = np.zeros((n, m)), np.zeros(m)
         com_reference, com_velocity = np.empty((n, 2)), np.empty((n, 2))
         polygons: list[SupportPolygon] = []
+        centring = np.zeros(n)
         made: dict[int, SupportPolygon] = {}
         which = 0
         for k, t in enumerate(times):
@@ -165,6 +166,7 @@ class Gait:
                 made[which] = _polygon(interval, half_extents, margin)
             polygons.append(made[which].shrunk(growth * t))
             _share(interval, shift[k])
+            centring[k] = float(interval.swing >= 0)
             com_reference[k] = interval.feet.positions[:, :2].mean(axis=0)
             com_velocity[k] = self._stepping.velocity(interval.feet, time + t)
         last = intervals[which]
@@ -177,6 +179,8 @@ class Gait:
             offsets=np.array([p.offsets for p in polygons]),
             shift=shift,
             polygons=tuple(polygons),
+            centres=np.array([p.centre for p in polygons]),
+            centring=centring,
             rest_normals=rest.normals,
             rest_offsets=rest.offsets,
             rest_shift=rest_shift,
@@ -195,7 +199,7 @@ class Gait:
         feet, moved = self.feet, (-1, -1)
         steps: list[Footstep] = []
         made: tuple[int, ...] = ()
-        if self.phase == SupportPhase.STAND or self.step is None and self.swing is None:
+        if self.phase == SupportPhase.STAND or (self.step is None and self.swing is None):
             return [_Interval(NEVER, feet, -1, moved)], steps
         end = min(self._left / max(rate, 1e-6), NEVER)
         intervals: list[_Interval] = []

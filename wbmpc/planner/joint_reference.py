@@ -8,7 +8,7 @@ from wbmpc.kinematics import Kinematics
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.whole_body import VelocityTasks
 from wbmpc.robot import Robot
-from wbmpc.rotations import level_frame, rotation_error
+from wbmpc.rotations import cross, level_frame, rotation_error
 from wbmpc.signals import SIDES, HandMode, Vector
 
 LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
@@ -64,6 +64,7 @@ class JointReference:
         sole_velocities: Vector,
         hands: list[tuple[Vector, Vector, HandMode]],
         posture: Vector,
+        torso_up: Vector,
     ) -> VelocityTasks:
         """Stage 2's velocity tasks at the reference.
 
@@ -74,6 +75,7 @@ class JointReference:
             sole_velocities: (2, 3) [m/s].
             hands: position [m], velocity [m/s] (3,) and mode of each hand.
             posture: (nj,) joint angles to be drawn to [rad].
+            torso_up: (3,) where the torso's own vertical should point, in world.
         """
         robot, settings, kinematics, nv = self._robot, self._settings, self._kinematics, self._robot.nv
         kinematics.update_kinematics(self.q)
@@ -117,7 +119,7 @@ class JointReference:
             hand_velocity=hand_velocity,
             hand_active=active,
             torso_jacobian=kinematics.jacobian(robot.torso_frame)[3:],
-            torso_velocity=np.array([up[1], -up[0], 0.0]),
+            torso_velocity=settings.torso_rate * cross(up, torso_up),
             posture_velocity=posture_velocity,
             lower=lower,
             upper=upper,

@@ -110,6 +110,7 @@ class Planner:
             sole_velocities=sole_velocity,
             hands=hands,
             posture=references.posture(contacts),
+            torso_up=references.torso_up(contacts),
         )
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 

@@ -167,6 +167,12 @@ class References:
         sigma = max((task.progress.sigma for task in self._current), default=0.0)
         return base[7:] + sigma * (self._goal.q[7:] - base[7:])
 
+    def torso_up(self, contacts: Contacts) -> Vector:
+        """Where the torso's own vertical should point (3,), in world: up, or as in the postures of contact and task."""
+        base = contacts.posture.torso_up if contacts.posture is not None else np.array([0.0, 0.0, 1.0])
+        sigma = max((task.progress.sigma for task in self._current), default=0.0)
+        return base + sigma * (self._goal.torso_up - base) if sigma > 0.0 else base
+
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
         taken = [task.side for task in self._current if isinstance(task, Reach)]

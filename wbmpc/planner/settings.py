@@ -37,7 +37,10 @@ class WholeBodySettings(StrictModel):
     velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(5e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
-    footstep_cost: float = Field(1.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
+    footstep_cost: float = Field(50.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
+    zmp_centre_cost: float = Field(
+        50.0, ge=0, description="[cost / m²] a ZMP off the centre of the foot that carries a step alone"
+    )
     foot_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a foot where it must not be")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
     rest_slack_cost: float = Field(1e4, gt=0, description="[cost / m²] price of a plan that cannot stop at its end")
@@ -52,7 +55,8 @@ class WholeBodySettings(StrictModel):
         0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
     )
     posture_rate: float = Field(1.0, ge=0, description="[1/s] pull of the joint velocities to the nominal posture")
-    torso_cost: float = Field(0.02, ge=0, description="[cost / (rad/s)²] pull of the torso to upright")
+    torso_cost: float = Field(0.3, ge=0, description="[cost / (rad/s)²] of the torso's rate against its pull")
+    torso_rate: float = Field(4.0, ge=0, description="[1/s] pull of the torso to upright, or to a reach's posture")
     tracking_rate: float = Field(8.0, gt=0, description="[1/s] pull of the joint reference to its CoM, hands and feet")
 
 

@@ -24,6 +24,8 @@ class SupportPreview:
     offsets: Vector  # (N, MAX_EDGES) [m] margins subtracted
     shift: Vector  # (N, MAX_FOOTSTEPS) share of a footstep's displacement by which the polygon moves
     polygons: tuple[SupportPolygon, ...]  # (N,) the same at the references
+    centres: Vector  # (N, 2) [m] of the polygons at the references
+    centring: Vector  # (N,) 0 … 1: how much the ZMP is drawn to them
     rest_normals: Vector  # (MAX_EDGES, 2) where the last knot's capture point may be
     rest_offsets: Vector  # (MAX_EDGES,)
     rest_shift: Vector  # (MAX_FOOTSTEPS,)
@@ -46,6 +48,8 @@ class SupportPreview:
             offsets=np.array([p.offsets for p in polygons]),
             shift=np.zeros((n, m)),
             polygons=polygons,
+            centres=np.array([p.centre for p in polygons]),
+            centring=np.zeros(n),
             rest_normals=rest.normals,
             rest_offsets=rest.offsets,
             rest_shift=np.zeros(m),

@@ -15,7 +15,7 @@ class Swing:
     """One swing foot as a function of σ in [0, 1], its share of the swing time.
 
     The foot rises, goes over, and comes down; how early it goes over depends on `Footstep.lead`. The landing place may
-    be moved while the foot is on its way: it follows at a bounded speed. After σ = 1 the foot is lowered until it lands.
+    be moved while the foot is on its way: it follows at a bounded speed. After σ = 1 the foot sinks until it lands.
     """
 
     def __init__(self, step: Footstep, *, start: Vector, yaw: float, speed: float) -> None:

@@ -146,6 +146,13 @@ class WholeBodyStage:
         free_velocity = state @ preview.P_vs.T
         free_zmp = P_zs @ state.T + zmp.offset  # (N, 2)
         self._costs(state, free, free_velocity, support, tasks, velocity_time, urgency)
+        if support.centring.any():
+            self._centring(P_zu, free_zmp, support)
+        else:
+            m = self._steps
+            qp.hessian[m, : m.start] = qp.hessian[: m.start, m] = 0.0
+            qp.hessian[m, m] = self._settings.footstep_cost * np.eye(2 * MAX_FOOTSTEPS)
+            qp.gradient[m] = 0.0
         self._support_rows(zmp, P_zu, free, free_velocity, free_zmp, support)
 
         gap = com_band - free[:, :, None]
@@ -218,6 +225,23 @@ class WholeBodyStage:
                 + settings.position_cost * (preview.P_pu.T @ (free[axis] - support.com_reference[:, axis]))
             )
             qp.gradient[first] += w_com * gain * wanted[axis]
+
+    def _centring(self, P_zu: Vector, free_zmp: Vector, support: SupportPreview) -> None:
+        """Add  w_z Σ s_k |Z_k − S_k (F − F_ref) − centre_k|²  to the costs of jerks and footsteps."""
+        n, m, qp = self._preview.steps, MAX_FOOTSTEPS, self.problem
+        weight = self._settings.zmp_centre_cost * support.centring
+        weighted = P_zu.T * weight  # (N jerks, N knots)
+        own, cross = weighted @ P_zu, -weighted @ support.shift
+        steps = (support.shift.T * weight) @ support.shift + self._settings.footstep_cost * np.eye(m)
+        error = free_zmp - support.centres  # (N, 2)
+        for axis in range(2):
+            jerks = slice(axis * n, (axis + 1) * n)
+            footsteps = slice(self._steps.start + axis * m, self._steps.start + (axis + 1) * m)
+            qp.hessian[jerks, jerks] += own
+            qp.hessian[jerks, footsteps], qp.hessian[footsteps, jerks] = cross, cross.T
+            qp.hessian[footsteps, footsteps] = steps
+            qp.gradient[jerks] += weighted @ error[:, axis]
+            qp.gradient[footsteps] = -(support.shift.T * weight) @ error[:, axis]
 
     def _support_rows(
         self,
