@@ -102,7 +102,7 @@ def test_a_second_contact_joins_a_first_that_turns_out_too_weak() -> None:
     given = scenario(
         "two_hands", patches=patches, world__objects={"shelf": shelf, "ghost": ghost}, checks=[{"kind": "withdrawn"}]
     )
-    result = run(given, 6.0)
+    result = run(given, 6.5)
     joined = result.fired[-1]
     assert [c.patch for c in result.fired[0].candidates if c.chosen] == ["left", "ghost"]
     assert [c.patch for c in joined.candidates if c.chosen] == ["right"]

@@ -109,7 +109,7 @@ class Planner:
             yaws=yaws,
             sole_velocities=sole_velocity,
             hands=hands,
-            posture=references.posture(contacts),
+            posture=references.posture(),
             torso_up=references.torso_up(contacts),
         )
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)

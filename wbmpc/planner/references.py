@@ -161,11 +161,10 @@ class References:
 
     # ------------------------------------------------------------------ now
 
-    def posture(self, contacts: Contacts) -> Vector:
-        """Joint angles (nj,) that the joint reference is drawn to: standing or braced, the task's by its progress."""
-        base = contacts.posture.q if contacts.posture is not None else self._nominal
+    def posture(self) -> Vector:
+        """Joint angles (nj,) that the joint reference is drawn to: standing, or the task's posture by its progress."""
         sigma = max((task.progress.sigma for task in self._current), default=0.0)
-        return base[7:] + sigma * (self._goal.q[7:] - base[7:])
+        return self._nominal[7:] + sigma * (self._goal.q[7:] - self._nominal[7:])
 
     def torso_up(self, contacts: Contacts) -> Vector:
         """Where the torso's own vertical should point (3,), in world: up, or as in the postures of contact and task."""
