@@ -13,10 +13,9 @@ from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
-from wbmpc.planner.zmp_model import need_at_rest
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import GRAVITY, SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
+from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
 
 RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
@@ -57,12 +56,11 @@ class Contacts:
     @property
     def gate_open(self) -> bool:
         """Whether tasks may go on: no contact is needed, or all that are expected carry load, or none can help."""
-        if not self._needed:
+        if not self._needed or not self.candidates.all:
             return True
         awaited = any(c.busy and c.expected for c in self.hands)
         carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self.hands)
-        helpless = self._hopeless >= GIVE_UP_TIME or not self.candidates.all
-        return (carried or helpless) and not awaited
+        return (carried or self._hopeless >= GIVE_UP_TIME) and not awaited
 
     @property
     def points(self) -> list[Vector | None]:
@@ -126,7 +124,8 @@ class Contacts:
         self,
         need: Need,
         *,
-        goal: Vector | None,
+        goal: Need | None,
+        binding: bool,
         palms: Vector,
         hand_taken: list[bool],
         polygon: SupportPolygon,
@@ -135,7 +134,8 @@ class Contacts:
         """Judge the need, choose contacts when those there are do not do, and plan the forces of those that touch.
 
         Args:
-            goal: CoM (3,) where the running task ends, beyond the horizon [m]; None without such a task.
+            goal: the need, of one knot, where the running task ends, maybe beyond the horizon; None without a task.
+            binding: whether there is no way back before that end (a foot in the air): it is waited for from the start.
             palms: (2, 3) measured [m].
             hand_taken: hands that a task uses.
             polygon: where the CoM may be before a contact carries load.
@@ -144,6 +144,8 @@ class Contacts:
             A report on every candidate when stage 3 fired (else empty), and stage 3's own report.
         """
         shift = float(np.abs(need.delta_z).max())
+        if binding and goal is not None:
+            shift = max(shift, float(np.abs(goal.delta_z).max()))
         self._needed = shift > self._settings.need_threshold
         self._quiet = shift < self._settings.quiet_threshold
         self._since_review += 1
@@ -155,7 +157,7 @@ class Contacts:
         elif self.candidates.all:
             if self._since_review >= RETRY_PLANS and (any(free) or len(self._committed) > 1):
                 self._since_review = 0
-                knots = self._worst_knots(need, goal, polygon)
+                knots = self._worst_knots(need, goal)
                 self._review(knots)
                 if self._short and any(free) and self._hopeless < GIVE_UP_TIME:
                     reports, stage = self._fire(knots, palms=palms, free=free, polygon=polygon, events=events)
@@ -172,17 +174,15 @@ class Contacts:
         leaving = (ContactPhase.UNLOADED, ContactPhase.RELEASED)
         return [c for c in self.hands if c.busy and c.phase not in leaving]
 
-    def _worst_knots(self, need: Need, goal: Vector | None, polygon: SupportPolygon) -> Need:
+    def _worst_knots(self, need: Need, goal: Need | None) -> Need:
         """Two knots to choose for: the largest shift in the horizon, and the task's end or the largest sideways.
 
         At the first sign of need the horizon shows a few millimetres; the contact must also do for where this leads.
         """
         sizes = np.abs(need.delta_z)
         worst = int(np.argmax(sizes.max(axis=1)))
-        mass = float(need.weight[worst]) / GRAVITY
-        final = None if goal is None else need_at_rest(goal, polygon=polygon, mass=mass)
-        if final is not None and np.abs(final.delta_z).max() > self._settings.need_threshold:
-            return need.pick([worst]).followed_by(final)
+        if goal is not None and np.abs(goal.delta_z).max() > self._settings.need_threshold:
+            return need.pick([worst]).followed_by(goal)
         return need.pick([worst, int(np.argmax(sizes[:, 1]))])
 
     def _review(self, knots: Need) -> None:

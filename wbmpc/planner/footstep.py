@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from wbmpc.signals import Vector
 
 
@@ -20,6 +22,11 @@ class Footstep:
     lead: float  # share of the swing in which the foot only rises, and at its end only sinks: 0 … 0.4
     adaptable: bool  # whether stage 2 may move it
     task: int  # index of the task that asks for it
+
+    def share(self, sigma: Vector) -> Vector:
+        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time; minimum jerk between leads."""
+        phase = np.clip((sigma - self.lead) / (1.0 - 2.0 * self.lead), 0.0, 1.0)
+        return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.settings import GaitSettings
 from wbmpc.planner.stepping import SIDE_SIGN, Stepping
+from wbmpc.planner.stride import Stride
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.swing import Swing
@@ -68,6 +69,14 @@ class Gait:
             positions[side], velocity[side], acceleration[side] = self.swing.reference(pace)
             yaws[side] = self.swing.yaw
         return positions, yaws, velocity, acceleration
+
+    @property
+    def stride(self) -> Stride | None:
+        """The step ahead or under way when its place is fixed: the CoM must go where it can be made."""
+        step = self.step if self.swing is None else self.swing.step
+        if self.phase == SupportPhase.STAND or step is None or step.adaptable:
+            return None
+        return Stride(step, self.feet, self.swing, self._left)
 
     # ------------------------------------------------------------------ one plan later
 
@@ -193,6 +202,12 @@ class Gait:
             com_reference=com_reference,
             com_velocity=com_velocity,
         )
+
+    def goal_polygon(self, *, half_extents: Vector, margin: float) -> SupportPolygon:
+        """What carries the robot where its task ends: the stance foot when a foot is put somewhere, else both feet."""
+        stride = self.stride
+        swing = -1 if stride is None else stride.step.side
+        return _polygon(_Interval(NEVER, self.feet, swing, (-1, -1)), half_extents, margin)
 
     def _intervals(self, time: float, horizon: float, rate: float) -> tuple[list[_Interval], list[Footstep]]:
         """Phases until the horizon [s] and the footsteps made in them, at most MAX_FOOTSTEPS."""

@@ -10,11 +10,12 @@ from wbmpc.planner.lean import Lean
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
+from wbmpc.planner.stride import Stride
 from wbmpc.robot import Robot
 from wbmpc.scenario import ComHeightTask, LeanTask, ReachTask, Task
 from wbmpc.signals import SIDES, HandMode, Vector
 
-REACH_FLOOR = 0.12  # [m] smallest d: a hand never pins the CoM to itself
+REACH_FLOOR, FOOT_FLOOR = 0.12, 0.05  # [m] smallest d of hand and foot: neither pins the CoM to itself
 UNBOUNDED = 0.3  # [m] d of a hand without a reference
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
@@ -33,7 +34,7 @@ class References:
         self, robot: Robot, tasks: tuple[Task, ...], *, q: Vector, palms: Vector, height: float, times: Vector
     ) -> None:
         """Start with palms at `palms` (2, 3) [m] and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
-        self._times, self._nominal, self._nominal_height = times, q, height
+        self._times, self._nominal_height = times, height
         self.reaches = [
             Reach(task, side=_hand_of(task, palms), palm=palms[_hand_of(task, palms)])
             for task in tasks
@@ -42,7 +43,9 @@ class References:
         self.leans = [Lean(task) for task in tasks if isinstance(task, LeanTask)]
         self._tasks: list[Reach | Lean] = [*self.reaches, *self.leans]
         self._heights = [task for task in tasks if isinstance(task, ComHeightTask)]
+        self._stand = Posture(robot, nominal=q, com_cost=COM_COST)
         self._reach_goal = Posture(robot, nominal=q, com_cost=COM_COST)
+        self._stride: Stride | None = None
         self._lean_goal = Posture(robot, nominal=q, com_cost=LEAN_COST)
         self._centre = np.zeros(2)  # [m] between the feet
         self._shrink = 0.0  # [m] taken off d
@@ -67,16 +70,34 @@ class References:
             if task.progress.phase != before:
                 events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
 
-    def update_goal(self, contacts: Contacts, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int) -> None:
-        """Improve the posture with palm or CoM at the task's target and the bracing palms on their patches."""
+    def update_postures(
+        self,
+        contacts: Contacts,
+        *,
+        soles: Vector,
+        yaws: Vector,
+        stride: Stride | None,
+        centre: Vector,
+        iterations: int,
+    ) -> None:
+        """Improve the postures: standing on the feet as they are, and the one in which the current task ends.
+
+        In the latter palm, foot or CoM are at the task's target and the bracing palms on their patches.
+        """
         self._centre = centre
+        if self._stride is not None and stride is None:  # landed: stand on from there
+            self._stand.q = self._reach_goal.q.copy()
+        self._stride = stride
+        self._stand.iterate(iterations, soles=soles, yaws=yaws, palms=[None, None], centre=centre)
+        if stride is not None:
+            soles, yaws = stride.after.positions, stride.after.yaws
         palms: list[Vector | None] = [c.goal for c in contacts.hands]
         for task in self._current:
             if isinstance(task, Lean):
                 centre = task.target
             else:
                 palms[task.side] = task.target
-        if self._leaning is not None or any(palm is not None for palm in palms):
+        if stride is not None or self._leaning is not None or any(palm is not None for palm in palms):
             self._goal.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     @property
@@ -100,8 +121,11 @@ class References:
 
     # ------------------------------------------------------------------ over the horizon
 
-    def palms(self, time: float, contacts: Contacts, *, full_pace: bool) -> tuple[Vector, Vector]:
-        """Palm references (2, N, 3) [m], nan for a free hand, and the furthest task's σ (N,)."""
+    def palms(self, time: float, contacts: Contacts, *, pace: float | None = None) -> tuple[Vector, Vector]:
+        """Palm references (2, N, 3) [m], nan for a free hand, and the furthest task's σ (N,).
+
+        `pace`: of all tasks' clocks, 0 … 1; None: each at its own gate's.
+        """
         times = self._times
         references = np.full((len(SIDES), len(times), 3), np.nan)
         sigma = np.zeros(len(times))
@@ -109,19 +133,24 @@ class References:
             if contact.goal is not None:
                 references[contact.side] = contact.preview(times)
         for task in self._current:
-            sigmas = task.progress.sigmas(time, times, rate=1.0 if full_pace else task.progress.rate)
+            sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
             sigma = np.maximum(sigma, sigmas)
             if isinstance(task, Reach):
                 references[task.side] = task.preview(sigmas)
         return references, sigma
 
-    def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector) -> Vector:
-        """Where the horizontal CoM may be (2, N, 2) [m]: within d of every palm, and near a lean's way; see `bands`.
+    def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector, foot: Vector) -> Vector:
+        """Where the horizontal CoM may be (2, N, 2) [m]: within d of palms and foot, near a lean's way; see `bands`.
 
         Args:
             palms, sigma: what `palms` answered, (2, N, 3) [m] and (N,).
+            foot: shares (N,) of a stride's way; without a stride not looked at.
         """
-        band = horizontal_band(palms, self._reach_distance(contacts))
+        places, distance = palms[:, :, :2], np.tile(self._reach_distance(contacts)[:, None], (1, len(foot), 1))
+        if self._stride is not None:
+            places = np.concatenate([places, self._stride.positions(foot)[None]])
+            distance = np.concatenate([distance, self._foot_distance(contacts, foot)[None]])
+        band = horizontal_band(places, distance)
         lean = self._leaning
         if lean is None:
             return band
@@ -131,16 +160,31 @@ class References:
         return np.where(asked[:, None], way[:, :, None] + [-LEAN_BAND, LEAN_BAND], band)
 
     def wanted_height(self, time: float, contacts: Contacts, sigma: Vector) -> Vector:
-        """CoM height (N,) to stay near [m]: a height task's profile, else that of the postures of contacts and task."""
-        base = contacts.posture.com[2] if contacts.posture is not None else self._nominal_height
+        """CoM height (N,) to stay near [m]: a height task's profile, else that of the postures of contacts and task.
+
+        `sigma` (N,): the furthest task's or the stride's progress.
+        """
+        base = self._base(contacts).com[2]
         wanted = np.full(len(self._times), base)
-        if self._current:
+        if self._current or self._stride is not None:
             wanted += sigma * (self._goal.com[2] - base)
         for task in self._heights:
             knots = [0.0] + [w.time for w in task.waypoints]
             heights = [self._nominal_height] + [w.height for w in task.waypoints]
             wanted = np.interp(time + self._times, knots, heights)
         return wanted
+
+    def _base(self, contacts: Contacts) -> Posture:
+        """What the robot does without a task: stand, or brace."""
+        return contacts.posture if contacts.posture is not None else self._stand
+
+    def _foot_distance(self, contacts: Contacts, share: Vector) -> Vector:
+        """d (N, 2) [m] of a stride's foot at `share` (N,) of its way, from the postures before and after."""
+        assert self._stride is not None
+        ends = self._stride.positions(np.array([0.0, 1.0]))
+        before = np.abs(ends[0] - self._base(contacts).com[:2])
+        after = np.abs(ends[1] - self._goal.com[:2])
+        return np.maximum(before + share[:, None] * (after - before), FOOT_FLOOR)
 
     def _reach_distance(self, contacts: Contacts) -> Vector:
         """d (2, 2) per hand and axis [m]: what lies between palm and CoM in the posture that the task needs.
@@ -151,7 +195,7 @@ class References:
         for contact in contacts.hands:
             if contact.goal is not None and braced is not None:
                 distance[contact.side] = np.abs(contact.goal[:2] - braced.com[:2])
-                if self._current:
+                if self._current or self._stride is not None:
                     with_task = np.abs(contact.goal[:2] - self._goal.com[:2])
                     distance[contact.side] = np.maximum(distance[contact.side], with_task)
         for task in self._current:
@@ -161,16 +205,21 @@ class References:
 
     # ------------------------------------------------------------------ now
 
-    def posture(self) -> Vector:
-        """Joint angles (nj,) that the joint reference is drawn to: standing, or the task's posture by its progress."""
-        sigma = max((task.progress.sigma for task in self._current), default=0.0)
-        return self._nominal[7:] + sigma * (self._goal.q[7:] - self._nominal[7:])
+    def posture(self, contacts: Contacts) -> Vector:
+        """Joint angles (nj,) that the joint reference is drawn to: standing or braced, the task's by its progress."""
+        base = self._base(contacts).q
+        return base[7:] + self._sigma * (self._goal.q[7:] - base[7:])
 
     def torso_up(self, contacts: Contacts) -> Vector:
-        """Where the torso's own vertical should point (3,), in world: up, or as in the postures of contact and task."""
-        base = contacts.posture.torso_up if contacts.posture is not None else np.array([0.0, 0.0, 1.0])
-        sigma = max((task.progress.sigma for task in self._current), default=0.0)
-        return base + sigma * (self._goal.torso_up - base) if sigma > 0.0 else base
+        """Where the torso's own vertical should point (3,), in world: as in those postures."""
+        base = self._base(contacts).torso_up
+        return base + self._sigma * (self._goal.torso_up - base)
+
+    @property
+    def _sigma(self) -> float:
+        """Progress of the furthest task or the stride."""
+        tasks = max((task.progress.sigma for task in self._current), default=0.0)
+        return tasks if self._stride is None else max(tasks, self._stride.sigma)
 
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
@@ -194,7 +243,8 @@ class References:
     @property
     def goal_com(self) -> Vector | None:
         """CoM (3,) [m] where the current task ends; None when none is on its way or holding."""
-        return self._goal.com if any(task.progress.ahead for task in self._current) else None
+        ahead = self._stride is not None or any(task.progress.ahead for task in self._current)
+        return self._goal.com if ahead else None
 
     @property
     def progress(self) -> float:
