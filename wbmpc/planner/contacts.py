@@ -194,12 +194,14 @@ class Contacts:
         threshold, committed = self._settings.need_threshold, self._committed
         held = _options(committed)
         self._short = not np.isfinite(self.candidates.carry(knots.inset(-threshold), held))
-        self._spare = None
+        before, self._spare = self._spare, None
         if len(committed) > 1 and not self._short:
-            alone = [self.candidates.carry(knots.inset(threshold), [option]) for option in held]
-            best = int(np.argmin(alone))
-            if np.isfinite(alone[best]):
-                self._spare = committed[1 - best].side
+            alone = {
+                c.side: self.candidates.carry(knots.inset(threshold), [o]) for c, o in zip(committed, held, strict=True)
+            }
+            spare = [side for side in alone if np.isfinite(alone[1 - side])]
+            if spare:  # once one is on its way out it stays that one
+                self._spare = before if before in spare else min(spare, key=lambda side: alone[1 - side])
 
     def _fire(
         self, knots: Need, *, palms: Vector, free: list[bool], polygon: SupportPolygon, events: list[str]
