@@ -15,7 +15,7 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import GRAVITY, SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
+from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
 
 RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact

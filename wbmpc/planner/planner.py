@@ -13,6 +13,7 @@ from wbmpc.planner.com_height import ComHeightStage, HeightPlan
 from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
+from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.plan import Plan
@@ -25,7 +26,7 @@ from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
-from wbmpc.scenario import PatchPose, Task
+from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
@@ -50,6 +51,7 @@ class Planner:
         *,
         tasks: tuple[Task, ...],
         patches: tuple[PatchPose, ...],
+        obstacles: tuple[Obstacle, ...] = (),
         q: Vector,
         period: float,
     ) -> None:
@@ -63,12 +65,11 @@ class Planner:
         )
         measured = self._measured = Kinematics(robot)
         measured.update_kinematics(q)
-        self._gait = Gait(
-            settings.gait, Stepping(tasks, settings.gait), soles=self._measured_soles(), yaws=self._measured_yaws()
-        )
+        stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
+        self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._palms = np.array([measured.position(f) for f in robot.palm_frames])
-        self._palm_homes = self._palms.copy()
+        self._palm_homes = self._in_torso(self._palms)  # where free hands hang
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
@@ -101,7 +102,9 @@ class Planner:
             foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        height, solution = self._plan_height(references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane)
+        height, solution = self._plan_height(
+            references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane
+        )
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
@@ -137,7 +140,9 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(self._need_stage, model, at_once, references.com_band(contacts, full_pace, full_sigma, foot))
+            wish, _ = stage_2(
+                self._need_stage, model, at_once, references.com_band(contacts, full_pace, full_sigma, foot)
+            )
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
@@ -197,6 +202,14 @@ class Planner:
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
 
+    def _in_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return (points - self._measured.position(frame)) @ self._measured.rotation(frame)
+
+    def _from_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return self._measured.position(frame) + points @ self._measured.rotation(frame).T
+
     def _measured_soles(self) -> Vector:
         return np.array([self._measured.position(f) for f in self._robot.sole_frames])
 
@@ -226,7 +239,7 @@ class Planner:
             dt,
             palms=self._palms,
             palm_forces=state.palm_force_in_world,
-            homes=self._palm_homes,
+            homes=self._from_torso(self._palm_homes),
             events=events,
         )
         self._improve_postures(iterations=2)

@@ -3,6 +3,7 @@
 from wbmpc.scenario.consistency import check_names
 from wbmpc.scenario.json_schema import scenario_json_schema
 from wbmpc.scenario.load import counterfactual, load_scenario, robot_path, vary
+from wbmpc.scenario.obstacles import Obstacle, resolve_obstacles
 from wbmpc.scenario.overrides import apply_overrides, parse_overrides
 from wbmpc.scenario.patches import PatchPose, resolve_patches
 from wbmpc.scenario.schema.experiments import Counterfactual, Sweep, Variation
@@ -38,6 +39,7 @@ __all__ = [
     "InitialState",
     "LeanTask",
     "LoopSettings",
+    "Obstacle",
     "Patch",
     "PatchPose",
     "PlantSettings",
@@ -59,6 +61,7 @@ __all__ = [
     "counterfactual",
     "load_scenario",
     "parse_overrides",
+    "resolve_obstacles",
     "resolve_patches",
     "robot_path",
     "scenario_json_schema",
