@@ -118,6 +118,11 @@ class References:
         up = np.array([0.0, 0.0, 1.0])
         return up + sigma * (self._goal.torso_up - up) if sigma > 0.0 else up
 
+    def torso_heading(self, feet: float) -> float:
+        """Yaw of the torso [rad]: the feet's, `feet`, or as in the reach's posture."""
+        sigma = max((r.sigma for r in self.reaches), default=0.0)
+        return feet + sigma * (self._goal.torso_heading - feet)
+
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
         taken = [r.side for r in self.reaches if r.phase != ReachPhase.DONE]

@@ -68,6 +68,9 @@ class GaitSettings(StrictModel):
     first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
     step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
     step_width: float = Field(0.09, gt=0, description="[m] between the soles' centres when walking")
+    turning_room: float = Field(
+        0.07, ge=0, description="[m] by which that width grows with the sine of the angle between the soles"
+    )
     narrowest: float = Field(0.08, gt=0, description="[m] smallest such width")
     widest: float = Field(0.20, gt=0, description="[m] largest such width")
     longest: float = Field(0.14, gt=0, description="[m] largest distance of a foot ahead of or behind the other")
