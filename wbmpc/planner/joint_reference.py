@@ -26,6 +26,8 @@ class JointReference:
     def __init__(self, robot: Robot, settings: WholeBodySettings, *, q: Vector) -> None:
         self._robot, self._settings = robot, settings
         self._kinematics = Kinematics(robot)
+        self._upper_body = np.setdiff1d(np.arange(robot.nj), np.concatenate(robot.leg_joints))
+        self._trunk = np.setdiff1d(self._upper_body, np.concatenate(robot.arm_joints))
         self.q = q.copy()  # (nq,)
         self._kinematics.update_kinematics(self.q)
 
@@ -106,6 +108,11 @@ class JointReference:
         torso = kinematics.rotation(robot.torso_frame)
         torso_error = cross(torso[:, 2], torso_up)
         torso_error[2] += angle_difference(torso_heading, heading_of(torso))
+        weight = np.ones(nv)  # the legs carry the CoM about: arms and waist have better things to do
+        weight[6 + self._upper_body] = settings.upper_body_share
+        for side in range(len(SIDES)):
+            if active[side]:
+                weight[6 + robot.arm_joints[side]] = weight[6 + self._trunk] = 1.0
         posture_velocity = np.zeros(nv)
         posture_velocity[6:] = settings.posture_rate * (posture - self.q[7:])
         speed = SPEED_SHARE * robot.joint_speed
@@ -124,6 +131,7 @@ class JointReference:
             torso_jacobian=kinematics.jacobian(robot.torso_frame)[3:],
             torso_velocity=settings.torso_rate * torso_error,
             posture_velocity=posture_velocity,
+            posture_weight=weight,
             lower=lower,
             upper=upper,
         )
