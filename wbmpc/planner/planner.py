@@ -14,7 +14,7 @@ from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.footholds import Footholds
-from wbmpc.planner.footstep import Feet
+from wbmpc.planner.footstep import Feet, SoleReferences
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.plan import Plan
@@ -27,6 +27,7 @@ from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
+from wbmpc.rotations import heading_of
 from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
 
@@ -112,18 +113,19 @@ class Planner:
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._palms)
-        soles, yaws, sole_velocity, sole_acceleration = self._gait.soles(self._gate)
+        soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
-            yaws=yaws,
-            sole_velocities=sole_velocity,
             hands=hands,
-            torso_up=references.torso_up(contacts),
             posture=references.posture(contacts),
+            torso_up=references.torso_up(contacts),
+            torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
         )
-        urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
+        # a robot that steps is not to stop, its coming steps catch it
+        alarm = self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
+        urgency = 1.0 + alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
             stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, com_band: Vector
@@ -187,7 +189,7 @@ class Planner:
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
-        self._last = self._make_plan(motion, height, hands, (soles, yaws, sole_velocity, sole_acceleration), report)
+        self._last = self._make_plan(motion, height, hands, soles, report)
         return self._last
 
     # ------------------------------------------------------------------ steps of one plan
@@ -218,7 +220,7 @@ class Planner:
 
     def _measured_yaws(self) -> Vector:
         rotations = (self._measured.rotation(f) for f in self._robot.sole_frames)
-        return np.array([np.arctan2(R[1, 0], R[0, 0]) for R in rotations])
+        return np.array([heading_of(R) for R in rotations])
 
     def _advance(self, state: RobotState, events: list[str]) -> None:
         """Steps, tasks, contacts and the postures behind them one plan further."""
@@ -309,7 +311,7 @@ class Planner:
         motion: HorizontalPlan | None,
         height: HeightPlan,
         hands: list[tuple[Vector, Vector, HandMode]],
-        feet: tuple[Vector, Vector, Vector, Vector],
+        soles: SoleReferences,
         report: PlanReport,
     ) -> Plan:
         if motion is None and self._last is not None:
@@ -340,10 +342,11 @@ class Planner:
             torso_rotation=self._joints.torso_rotation,
             torso_angular_velocity=self._joints.torso_velocity(velocity),
             foot_stance=np.array(self._gait.stance),
-            foot_position=feet[0],
-            foot_yaw=feet[1],
-            foot_velocity=feet[2],
-            foot_acceleration=feet[3],
+            foot_position=soles.positions,
+            foot_yaw=soles.yaws,
+            foot_yaw_rate=soles.yaw_rates,
+            foot_velocity=soles.velocities,
+            foot_acceleration=soles.accelerations,
             hand_mode=np.array([int(mode) for _, _, mode in hands]),
             hand_position=palm_position,
             hand_velocity=palm_velocity,
