@@ -99,7 +99,7 @@ class Planner:
         mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
 
         stride, times = self._gait.stride, preview.times
-        full_pace, full_sigma = references.palms(state.time, contacts, pace=1.0)
+        full_pace, full_sigma = references.palms(state.time, None, pace=1.0)
         gated, sigma = references.palms(state.time, contacts)
         foot, gated_foot = np.zeros(preview.steps), np.zeros(preview.steps)
         if stride is not None:
@@ -157,6 +157,7 @@ class Planner:
                     palms=self._palms,
                     hand_taken=references.hands_taken(),
                     polygon=polygon,
+                    spent=references.spent(contacts),
                     events=events,
                 )
         forces = contacts.forces
@@ -226,7 +227,8 @@ class Planner:
         """Steps, tasks, contacts and the postures behind them one plan further."""
         contacts, references, dt = self._contacts, self._references, self._elapsed
         gate_open = contacts.gate_open
-        self._gate = float(np.clip(self._gate + (dt if gate_open else -dt) / GATE_TIME, 0.0, 1.0))
+        go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
+        self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
         self._gait.aim(self._footstep_shift[0], dt)
         self._gait.advance(
             state.time,
