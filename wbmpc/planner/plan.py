@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.whole_body import HorizontalPlan
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
 
@@ -93,3 +95,23 @@ class Plan:
             hand_normal=self.hand_normal,
             hand_friction=self.hand_friction,
         )
+
+
+def com_course(now: Vector, motion: HorizontalPlan | None, height: HeightPlan) -> tuple[Vector, Vector]:
+    """CoM states (N + 1, 3 axes, 3) now and at every knot, and jerks (N, 3), of what stages 1 and 2 have planned.
+
+    Args:
+        now: (3, 3) c, ċ, c̈ per axis [m, m/s, m/s²].
+        motion: None when stage 2 has failed: the CoM stays where it is, with its velocity as reference.
+        height: stage 1's answer.
+    """
+    n = len(height.jerk)
+    states, jerk = np.empty((n + 1, 3, 3)), np.zeros((n, 3))
+    states[0] = now
+    jerk[:, 2] = height.jerk
+    states[1:, 2] = np.column_stack([height.height, height.velocity, height.acceleration])
+    states[1:, :2] = now[:2]
+    if motion is not None:
+        jerk[:, :2] = motion.jerk
+        states[1:, :2] = np.stack([motion.com, motion.velocity, motion.acceleration], axis=2)
+    return states, jerk

@@ -7,7 +7,6 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.kinematics import Kinematics
 from wbmpc.planner.bands import height_band
 from wbmpc.planner.com_height import ComHeightStage, HeightPlan
 from wbmpc.planner.com_state import ComState
@@ -17,17 +16,17 @@ from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet, SoleReferences
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
-from wbmpc.planner.plan import Plan
+from wbmpc.planner.plan import Plan, com_course
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.references import References
 from wbmpc.planner.settings import PlannerSettings
+from wbmpc.planner.snapshot import Snapshot
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
-from wbmpc.rotations import heading_of
 from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
 
@@ -66,18 +65,17 @@ class Planner:
             WholeBodyStage(self._preview, robot.nv, settings.whole_body, backend=settings.qp_backend, ask_shift=ask)
             for ask in (True, False)
         )
-        measured = self._measured = Kinematics(robot)
-        measured.update_kinematics(q)
+        measured = self._measured = Snapshot(robot, q)
         stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
-        self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
+        self._gait = Gait(settings.gait, stepping, soles=measured.soles, yaws=measured.sole_yaws)
         self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
-        self._palms = np.array([measured.position(f) for f in robot.palm_frames])
-        self._palm_homes = self._in_torso(self._palms)  # where free hands hang
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
-        self._references = References(robot, tasks, q=q, palms=self._palms, height=float(measured.com[2]), times=times)
+        self._references = References(
+            robot, tasks, q=q, palms=measured.palms, height=float(measured.com[2]), times=times
+        )
         self._joints = JointReference(robot, settings.whole_body, q=q)
         self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
@@ -106,13 +104,12 @@ class Planner:
             foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        height, solution = self._plan_height(
-            references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane
-        )
+        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot))
+        height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
-        hands = references.hand_targets(contacts, self._palms)
+        hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
@@ -154,7 +151,7 @@ class Planner:
                     need_of(wish, height, model, polygons=at_once.polygons, mass=mass, exact=exact),
                     goal=self._goal_need(mass),
                     binding=stride is not None,
-                    palms=self._palms,
+                    palms=self._measured.palms,
                     hand_taken=references.hands_taken(),
                     polygon=polygon,
                     spent=references.spent(contacts),
@@ -197,8 +194,7 @@ class Planner:
 
     def _observe(self, state: RobotState) -> None:
         """Take in what was measured; continue the planned state to now."""
-        self._measured.update(state.q, state.v)
-        self._palms = np.array([self._measured.position(f) for f in self._robot.palm_frames])
+        self._measured.update(state)
         self._com.filter(self._measured.com_velocity)
         if self._last is not None:
             self._elapsed = state.time - self._time
@@ -207,21 +203,6 @@ class Planner:
             self._com.update(planned, measured=self._measured.com, height=float(planned[2, 0]) - plane)
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
-
-    def _in_torso(self, points: Vector) -> Vector:
-        frame = self._robot.torso_frame
-        return (points - self._measured.position(frame)) @ self._measured.rotation(frame)
-
-    def _from_torso(self, points: Vector) -> Vector:
-        frame = self._robot.torso_frame
-        return self._measured.position(frame) + points @ self._measured.rotation(frame).T
-
-    def _measured_soles(self) -> Vector:
-        return np.array([self._measured.position(f) for f in self._robot.sole_frames])
-
-    def _measured_yaws(self) -> Vector:
-        rotations = (self._measured.rotation(f) for f in self._robot.sole_frames)
-        return np.array([heading_of(R) for R in rotations])
 
     def _advance(self, state: RobotState, events: list[str]) -> None:
         """Steps, tasks, contacts and the postures behind them one plan further."""
@@ -234,19 +215,19 @@ class Planner:
             state.time,
             dt,
             rate=self._gate,
-            soles=self._measured_soles(),
-            yaws=self._measured_yaws(),
+            soles=self._measured.soles,
+            yaws=self._measured.sole_yaws,
             loads=state.sole_wrench_in_world[:, 2],
             events=events,
         )
         references.advance(
-            state.time, dt, gate_open=gate_open, palms=self._palms, com=self._measured.com, events=events
+            state.time, dt, gate_open=gate_open, palms=self._measured.palms, com=self._measured.com, events=events
         )
         contacts.advance(
             dt,
-            palms=self._palms,
+            palms=self._measured.palms,
             palm_forces=state.palm_force_in_world,
-            homes=self._from_torso(self._palm_homes),
+            homes=self._measured.palm_homes,
             events=events,
         )
         asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
@@ -297,17 +278,6 @@ class Planner:
         at_once = preview(1.0)
         return at_once, at_once if self._gate >= 1.0 else preview(self._gate)
 
-    def _plan_height(self, wanted: Vector, band: Vector, plane: float) -> tuple[HeightPlan, QpSolution]:
-        """Stage 1; when it fails or is turned off the height stays where it is."""
-        settings, steps = self._settings.height, self._preview.steps
-        limits = np.tile([plane + settings.lowest, plane + settings.highest], (steps, 1))
-        plan, solution = self._height_stage.solve(self._com.value[2], wanted=wanted, limits=limits, band=band)
-        if plan is None or not settings.enabled:
-            self._com.value[2, 1:] = 0.0
-            zero = np.zeros(steps)
-            plan = HeightPlan(zero, np.full(steps, self._com.value[2, 0]), zero, zero)
-        return plan, solution
-
     def _make_plan(
         self,
         motion: HorizontalPlan | None,
@@ -318,19 +288,9 @@ class Planner:
     ) -> Plan:
         if motion is None and self._last is not None:
             return replace(self._last, report=report)
-        n, com, contacts = self._preview.steps, self._com.value, self._contacts.hands
-        states = np.empty((n + 1, 3, 3))
-        states[0] = com
-        jerk = np.zeros((n, 3))
-        jerk[:, 2] = height.jerk
-        states[1:, 2] = np.column_stack([height.height, height.velocity, height.acceleration])
-        velocity = np.zeros(self._robot.nv)
-        if motion is not None:
-            jerk[:, :2] = motion.jerk
-            states[1:, :2] = np.stack([motion.com, motion.velocity, motion.acceleration], axis=2)
-            velocity = motion.joint_velocity
-        else:
-            states[1:, :2] = com[:2]
+        contacts = self._contacts.hands
+        velocity = motion.joint_velocity if motion is not None else np.zeros(self._robot.nv)
+        states, jerk = com_course(self._com.value, motion, height)
         palm_position, palm_velocity = self._joints.palms(velocity)
         caps = np.array([c.caps(np.array([0.0, self._period])) for c in contacts])  # now and one plan later
         zero = np.zeros((len(SIDES), 3))
