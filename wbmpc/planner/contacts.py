@@ -72,8 +72,20 @@ class Contacts:
 
     # ------------------------------------------------------------------ one plan
 
-    def advance(self, dt: float, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
-        """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N]."""
+    def advance(
+        self,
+        dt: float,
+        *,
+        palms: Vector,
+        palm_forces: Vector,
+        homes: Vector,
+        urgency: float,
+        events: list[str],
+    ) -> None:
+        """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N].
+
+        `urgency` 0 … 1 is the alarm that a push has sounded.
+        """
         for contact in self.hands:
             side, before, patch = contact.side, contact.phase, self.name(contact.side)
             outcome = contact.advance(
@@ -83,6 +95,7 @@ class Contacts:
                 wanted_force=float(self.forces[side, 0] @ contact.patch.normal) if contact.patch else 0.0,
                 needed=self._needed,
                 quiet=self._quiet,
+                urgency=urgency,
                 home=homes[side],
             )
             if outcome == "failed":

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.planner.hand_path import HandPath
+from wbmpc.planner.pace import Pace
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import ContactPhase, HandMode, Vector
 
-ARRIVED = 0.012  # [m] palm error at the clearance point below which the descent begins
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
@@ -34,6 +34,9 @@ class HandContact:
         self._sigma, self._duration, self._rate = 0.0, 1.0, 1.0
         self._touched = np.zeros(3)
         self._unloaded_clock = 0.0
+        self._urgency = 0.0  # 0 … 1, now
+        self._pace = Pace.of(settings, 0.0)  # of the present approach
+        self._palm, self._palm_velocity = np.full(3, np.nan), np.zeros(3)  # [m], [m/s] measured
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -65,6 +68,11 @@ class HandContact:
         return HandMode.MOVE if self.busy else HandMode.FREE
 
     @property
+    def hurried(self) -> bool:
+        """Whether the palm is on an urgent way to its patch."""
+        return self.phase in (ContactPhase.CHOSEN, ContactPhase.APPROACHING) and self._pace.urgency > 0.5
+
+    @property
     def goal(self) -> Vector | None:
         """Palm position (3,) of the contact in world [m]; None when there is none to reach or hold."""
         if self.patch is None or self.phase == ContactPhase.RELEASED:
@@ -79,12 +87,11 @@ class HandContact:
         assert self._path is not None
         assert self.patch is not None
         if self._descent >= 0.0:
-            settings = self._settings
-            moving = self._descent < settings.approach_clearance + settings.search_depth
+            moving = self._descent < self._pace.clearance + self._settings.search_depth
             normal = self.patch.normal
             return (
                 self._path.end - self._descent * normal,
-                -settings.touch_speed * normal if moving else zero,
+                -self._pace.touch_speed * normal if moving else zero,
                 zero,
             )
         p, dp, ddp = self._path.at(self._sigma)
@@ -100,7 +107,8 @@ class HandContact:
         """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
         if not self.touching or self.patch is None:
             return np.zeros(len(times))
-        slope = (-1.0 if self.phase == ContactPhase.UNLOADED else 1.0) / self._settings.ramp_time
+        unloading = self.phase == ContactPhase.UNLOADED
+        slope = -1.0 / self._settings.ramp_time if unloading else 1.0 / self._pace.ramp_time
         return self.patch.force_cap * np.clip(self._level + slope * times, 0.0, 1.0)
 
     # ------------------------------------------------------------------ the life
@@ -108,10 +116,17 @@ class HandContact:
     def choose(self, patch: PatchPose, *, palm: Vector) -> None:
         """Stage 3 has chosen `patch`; the palm is at `palm` (3,)."""
         self.patch = patch
-        settings = self._settings
-        clearance = patch.position + (self._radius + settings.approach_clearance) * patch.normal
-        self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)
-        self._duration = max(0.4, float(np.linalg.norm(clearance - palm)) / settings.approach_speed)
+        pace = self._pace = Pace.of(self._settings, self._urgency)
+        clearance = patch.position + (self._radius + pace.clearance) * patch.normal
+        self._duration = max(pace.shortest, float(np.linalg.norm(clearance - palm)) / pace.speed)
+        self._path = HandPath(
+            start=palm.copy(),
+            end=clearance,
+            away=patch.normal,
+            haste=pace.urgency,
+            departure=pace.urgency * self._duration * self._palm_velocity,
+            arrival=-pace.urgency * self._duration * pace.touch_speed * patch.normal,
+        )
         self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
         self._enter(ContactPhase.CHOSEN)
 
@@ -129,7 +144,16 @@ class HandContact:
             self.phase = ContactPhase.NEEDED if needed else ContactPhase.NONE
 
     def advance(
-        self, dt: float, *, palm: Vector, force: Vector, wanted_force: float, needed: bool, quiet: bool, home: Vector
+        self,
+        dt: float,
+        *,
+        palm: Vector,
+        force: Vector,
+        wanted_force: float,
+        needed: bool,
+        quiet: bool,
+        urgency: float,
+        home: Vector,
     ) -> str | None:
         """One plan later.
 
@@ -140,11 +164,16 @@ class HandContact:
             wanted_force: normal force that the plan asks for now [N].
             needed: whether stage 2 still asks for a shift.
             quiet: whether the asked shift is negligible over the whole horizon.
+            urgency: how soon a contact is needed, 0 … 1: the planner's alarm.
             home: where the palm returns to (3,) [m].
 
         Returns:
             "failed" when the expected contact was not found and the candidate must be given up, else None.
         """
+        self._urgency = urgency
+        if np.isfinite(self._palm).all() and dt > 0.0:
+            self._palm_velocity = (palm - self._palm) / dt
+        self._palm = palm.copy()
         if not self.busy or self.patch is None:
             return None
         settings, phase = self._settings, self.phase
@@ -166,7 +195,7 @@ class HandContact:
             elif self._level <= 0.0:
                 self.release(palm=palm, home=home)
         else:
-            self._level = min(1.0, self._level + dt / settings.ramp_time)
+            self._level = min(1.0, self._level + dt / self._pace.ramp_time)
             if phase == ContactPhase.SENSED and self._level >= 1.0:
                 self._enter(ContactPhase.LOADED)
             elif phase == ContactPhase.LOADED and quiet:
@@ -190,29 +219,29 @@ class HandContact:
         if not needed and self._clock > 0.5:
             self.release(palm=palm, home=home)
             return None
-        if self._descent < 0.0:
-            self._sigma = min(1.0, self._sigma + self._rate * dt)
-            if self._sigma >= 1.0:
-                if np.linalg.norm(palm - self._path.end) < ARRIVED:
-                    self._descent = 0.0
-                elif self._clock > self._duration + PATIENCE:
-                    return "failed"
-            return None
-        if normal_force > settings.sensed_force:
+        if normal_force > settings.sensed_force and (self._descent >= 0.0 or self._pace.urgency > 0.0):
             self._touched = palm.copy()
             self._level, self._unloaded_clock = 0.0, 0.0
             self._enter(ContactPhase.SENSED)
             return None
-        depth = settings.approach_clearance + settings.search_depth
+        if self._descent < 0.0:
+            self._sigma = min(1.0, self._sigma + self._rate * dt)
+            if self._sigma >= 1.0:
+                if np.linalg.norm(palm - self._path.end) < self._pace.arrived:
+                    self._descent = 0.0
+                elif self._clock > self._duration + PATIENCE:
+                    return "failed"
+            return None
+        depth = self._pace.clearance + settings.search_depth
         if self._descent >= depth:
             return "failed"
-        self._descent = min(depth, self._descent + settings.touch_speed * dt)
+        self._descent = min(depth, self._descent + self._pace.touch_speed * dt)
         return None
 
     def _descend_again(self, palm: Vector) -> None:
         assert self.patch is not None
-        settings = self._settings
-        start = palm + 0.3 * settings.approach_clearance * self.patch.normal
+        self._pace = Pace.of(self._settings, self._urgency)
+        start = palm + 0.3 * self._pace.clearance * self.patch.normal
         self._path = HandPath(start=start, end=start, away=self.patch.normal)
         self._descent, self._level, self._unloaded_clock = 0.0, 0.0, 0.0
         self._enter(ContactPhase.APPROACHING)

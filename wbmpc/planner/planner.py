@@ -193,6 +193,7 @@ class Planner:
             palms=self._palms,
             palm_forces=state.palm_force_in_world,
             homes=self._palm_homes,
+            urgency=self._com.alarm,
             events=events,
         )
         self._improve_postures(polygon.centre, iterations=2)
@@ -251,6 +252,11 @@ class Planner:
         else:
             states[1:, :2] = com[:2]
         palm_position, palm_velocity = self._joints.palms(velocity)
+        palm_acceleration = np.zeros((len(SIDES), 3))
+        for contact in contacts:
+            if contact.hurried:  # straight from its path: stage 2's joint reference would come too late
+                side = contact.side
+                palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
         caps = np.array([c.caps(np.array([0.0, self._period])) for c in contacts])  # now and one plan later
         zero = np.zeros((len(SIDES), 3))
         return Plan(
@@ -270,7 +276,7 @@ class Planner:
             hand_mode=np.array([int(mode) for _, _, mode in hands]),
             hand_position=palm_position,
             hand_velocity=palm_velocity,
-            hand_acceleration=zero,
+            hand_acceleration=palm_acceleration,
             hand_force=report.contact_force[:, 0],
             hand_force_cap=caps[:, 0],
             hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / self._period,

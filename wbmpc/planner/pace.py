@@ -1,0 +1,40 @@
+"""How fast a hand goes to its contact: from careful, for a reach, to all that the arm can do, for a push."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from wbmpc.planner.settings import ContactSettings
+
+UNHURRIED_TIME, HURRIED_TIME = 0.4, 0.1  # [s] shortest approach
+ARRIVED, ROUGHLY_ARRIVED = 0.012, 0.05  # [m] palm error at the clearance point below which the descent begins
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Speeds and times of one approach, between the careful (urgency 0) and the urgent (1) end of the settings."""
+
+    urgency: float  # 0 … 1
+    speed: float  # [m/s] mean speed of the palm on its way
+    shortest: float  # [s] least time of the way
+    clearance: float  # [m] distance from the surface at which the way ends and the descent begins
+    arrived: float  # [m] palm error there that is small enough
+    touch_speed: float  # [m/s] of the descent
+    ramp_time: float  # [s] of the force cap from nothing to all
+
+    @classmethod
+    def of(cls, settings: ContactSettings, urgency: float) -> Pace:
+        """`urgency` 0 … 1: the planner's alarm."""
+
+        def between(calm: float, urgent: float) -> float:
+            return calm + urgency * (urgent - calm)
+
+        return cls(
+            urgency=urgency,
+            speed=between(settings.approach_speed, settings.urgent_speed),
+            shortest=between(UNHURRIED_TIME, HURRIED_TIME),
+            clearance=between(settings.approach_clearance, 0.0),
+            arrived=between(ARRIVED, ROUGHLY_ARRIVED),
+            touch_speed=between(settings.touch_speed, settings.urgent_touch_speed),
+            ramp_time=between(settings.ramp_time, settings.urgent_ramp_time),
+        )
