@@ -46,6 +46,7 @@ class Contacts:
         self._needed, self._quiet = False, True
         self._hopeless = 0.0  # [s] that no candidate has been able to help
         self._since_fired = RETRY_PLANS
+        self._palm_velocities = np.zeros((len(SIDES), 3))  # [m/s] measured at the last plan
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -77,20 +78,23 @@ class Contacts:
         dt: float,
         *,
         palms: Vector,
+        palm_velocities: Vector,
         palm_forces: Vector,
         homes: Vector,
         urgency: float,
         events: list[str],
     ) -> None:
-        """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N].
+        """Every contact's life one plan further, with measured palms (2, 3) [m, m/s] and forces (2, 3) [N].
 
         `urgency` 0 … 1 is the alarm that a push has sounded.
         """
+        self._palm_velocities = palm_velocities
         for contact in self.hands:
             side, before, patch = contact.side, contact.phase, self.name(contact.side)
             outcome = contact.advance(
                 dt,
                 palm=palms[side],
+                palm_velocity=palm_velocities[side],
                 force=palm_forces[side],
                 wanted_force=float(self.forces[side, 0] @ contact.patch.normal) if contact.patch else 0.0,
                 needed=self._needed,
@@ -174,7 +178,9 @@ class Contacts:
         answer = f"chose {winner.patch.name} for the {SIDES[winner.hand]} hand" if winner else "no candidate helps"
         events.append(f"stage 3 fired: |ΔZ| {1e3 * sizes.max():.1f} mm at knot {worst + 1}, {answer}")
         if winner:
-            self.hands[winner.hand].choose(winner.patch, palm=palms[winner.hand])
+            self.hands[winner.hand].choose(
+                winner.patch, palm=palms[winner.hand], palm_velocity=self._palm_velocities[winner.hand]
+            )
             self._hopeless = 0.0
         return reports, stage
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbmpc.planner.hand_path import HandPath
+from wbmpc.planner.hand_path import HandPath, Landing
 from wbmpc.planner.pace import Pace
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.scenario import PatchPose
@@ -12,6 +12,8 @@ from wbmpc.signals import ContactPhase, HandMode, Vector
 
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
+
+LAST_AIM = 0.04  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
 TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
 
@@ -36,7 +38,7 @@ class HandContact:
         self._unloaded_clock = 0.0
         self._urgency = 0.0  # 0 … 1, now
         self._pace = Pace.of(settings, 0.0)  # of the present approach
-        self._palm, self._palm_velocity = np.full(3, np.nan), np.zeros(3)  # [m], [m/s] measured
+        self._landing: Landing | None = None  # an urgent approach, as aimed at the last plan
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -70,7 +72,7 @@ class HandContact:
     @property
     def hurried(self) -> bool:
         """Whether the palm is on an urgent way to its patch."""
-        return self.phase in (ContactPhase.CHOSEN, ContactPhase.APPROACHING) and self._pace.urgency > 0.5
+        return self.phase in (ContactPhase.CHOSEN, ContactPhase.APPROACHING) and self._pace.hurried
 
     @property
     def goal(self) -> Vector | None:
@@ -86,6 +88,8 @@ class HandContact:
             return self._touched, zero, zero
         assert self._path is not None
         assert self.patch is not None
+        if self._landing is not None and self.hurried:
+            return self._landing.at(0.0)
         if self._descent >= 0.0:
             moving = self._descent < self._pace.clearance + self._settings.search_depth
             normal = self.patch.normal
@@ -99,6 +103,8 @@ class HandContact:
 
     def preview(self, times: Vector) -> Vector:
         """Palm references (n, 3) [m] at `times` (n,) seconds from now, while there is a goal to reach or hold."""
+        if self._landing is not None and self.hurried:
+            return np.array([self._landing.at(min(t, self._landing.duration))[0] for t in times])
         if self.touching or self._path is None or self._descent >= 0.0:
             return np.tile(self.reference()[0], (len(times), 1))
         return self._path.positions(np.clip(self._sigma + self._rate * times, 0.0, 1.0))
@@ -113,22 +119,18 @@ class HandContact:
 
     # ------------------------------------------------------------------ the life
 
-    def choose(self, patch: PatchPose, *, palm: Vector) -> None:
-        """Stage 3 has chosen `patch`; the palm is at `palm` (3,)."""
+    def choose(self, patch: PatchPose, *, palm: Vector, palm_velocity: Vector) -> None:
+        """Stage 3 has chosen `patch`; the palm is at `palm` (3,) [m] and moves with `palm_velocity` (3,) [m/s]."""
         self.patch = patch
         pace = self._pace = Pace.of(self._settings, self._urgency)
         clearance = patch.position + (self._radius + pace.clearance) * patch.normal
+        self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)
         self._duration = max(pace.shortest, float(np.linalg.norm(clearance - palm)) / pace.speed)
-        self._path = HandPath(
-            start=palm.copy(),
-            end=clearance,
-            away=patch.normal,
-            haste=pace.urgency,
-            departure=pace.urgency * self._duration * self._palm_velocity,
-            arrival=-pace.urgency * self._duration * pace.touch_speed * patch.normal,
-        )
         self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
         self._enter(ContactPhase.CHOSEN)
+        self._landing = None
+        if pace.hurried:
+            self._aim(palm, palm_velocity)
 
     def release(self, *, palm: Vector, home: Vector) -> None:
         """Leave the surface (or give the approach up): lift along the normal and return to `home` (3,)."""
@@ -148,6 +150,7 @@ class HandContact:
         dt: float,
         *,
         palm: Vector,
+        palm_velocity: Vector,
         force: Vector,
         wanted_force: float,
         needed: bool,
@@ -160,6 +163,7 @@ class HandContact:
         Args:
             dt: since the last call [s].
             palm: measured palm position (3,) [m].
+            palm_velocity: measured (3,) [m/s].
             force: measured palm force (3,) [N].
             wanted_force: normal force that the plan asks for now [N].
             needed: whether stage 2 still asks for a shift.
@@ -171,17 +175,16 @@ class HandContact:
             "failed" when the expected contact was not found and the candidate must be given up, else None.
         """
         self._urgency = urgency
-        if np.isfinite(self._palm).all() and dt > 0.0:
-            self._palm_velocity = (palm - self._palm) / dt
-        self._palm = palm.copy()
         if not self.busy or self.patch is None:
             return None
         settings, phase = self._settings, self.phase
         self._clock += dt
         normal_force = float(force @ self.patch.normal)
         if phase == ContactPhase.CHOSEN:
-            self._enter(ContactPhase.APPROACHING)
-        elif phase == ContactPhase.APPROACHING:
+            phase = self.phase = ContactPhase.APPROACHING  # the clock goes on
+        if phase == ContactPhase.APPROACHING:
+            if self._landing is not None and normal_force <= settings.sensed_force:
+                self._aim(palm, palm_velocity)
             return self._approach(dt, palm=palm, normal_force=normal_force, needed=needed, home=home)
         elif phase == ContactPhase.RELEASED:
             self._sigma += self._rate * dt
@@ -219,7 +222,7 @@ class HandContact:
         if not needed and self._clock > 0.5:
             self.release(palm=palm, home=home)
             return None
-        if normal_force > settings.sensed_force and (self._descent >= 0.0 or self._pace.urgency > 0.0):
+        if normal_force > settings.sensed_force and (self._descent >= 0.0 or self.hurried):
             self._touched = palm.copy()
             self._level, self._unloaded_clock = 0.0, 0.0
             self._enter(ContactPhase.SENSED)
@@ -237,6 +240,19 @@ class HandContact:
             return "failed"
         self._descent = min(depth, self._descent + self._pace.touch_speed * dt)
         return None
+
+    def _aim(self, palm: Vector, palm_velocity: Vector) -> None:
+        """Aim an urgent approach anew from where the palm is; near the surface only its speed is still corrected."""
+        assert self.patch is not None
+        normal = self.patch.normal
+        left = max(self._duration - self._clock, LAST_AIM)
+        self._landing = Landing(
+            start=palm.copy(),
+            velocity=palm_velocity.copy(),
+            end=self.patch.position + self._radius * normal,
+            arrival=-self._pace.touch_speed * normal,
+            duration=left,
+        )
 
     def _descend_again(self, palm: Vector) -> None:
         assert self.patch is not None

@@ -22,6 +22,11 @@ class Pace:
     touch_speed: float  # [m/s] of the descent
     ramp_time: float  # [s] of the force cap from nothing to all
 
+    @property
+    def hurried(self) -> bool:
+        """Whether the palm goes straight to the surface, as fast as this."""
+        return self.urgency > 0.5
+
     @classmethod
     def of(cls, settings: ContactSettings, urgency: float) -> Pace:
         """`urgency` 0 … 1: the planner's alarm."""

@@ -191,6 +191,7 @@ class Planner:
         contacts.advance(
             self._elapsed,
             palms=self._palms,
+            palm_velocities=np.array([self._measured.jacobian(f)[:3] @ state.v for f in self._robot.palm_frames]),
             palm_forces=state.palm_force_in_world,
             homes=self._palm_homes,
             urgency=self._com.alarm,
