@@ -13,7 +13,7 @@ from wbmpc.signals import ContactPhase, HandMode, Vector
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
-LAST_AIM = 0.04  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
+LAST_AIM = 0.02  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
 TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
 

@@ -67,7 +67,7 @@ class Planner:
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
         self._references = References(robot, tasks, q=q, palms=self._palms, height=float(measured.com[2]), times=times)
         self._joints = JointReference(robot, settings.whole_body, q=q)
-        self._improve_postures(self._polygon().centre, iterations=FIRST_ITERATIONS, everyone=True)
+        self._improve_postures(self._polygon(alarm=0.0).centre, iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
         self._time, self._elapsed = (
             0.0,
@@ -80,9 +80,12 @@ class Planner:
         events: list[str] = []
         settings, preview, contacts, references = self._settings, self._preview, self._contacts, self._references
         self._observe(state)
-        polygon = self._polygon()
+        polygon = self._polygon(alarm=self._com.alarm)
         growth = settings.whole_body.zmp_margin_growth
         polygons = tuple(polygon.shrunk(growth * t) for t in preview.times)
+        # A hand takes its time: whether one is needed is judged by the usual inset, even when the feet use their edges.
+        calm = self._polygon(alarm=0.0)
+        calm_polygons = tuple(calm.shrunk(growth * t) for t in preview.times)
         self._advance(state, polygon, events)
         mass, plane, exact = state.mass_scale * self._robot.mass, polygon.plane_height, settings.formulation == "exact"
 
@@ -108,7 +111,7 @@ class Planner:
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage, zmp: ZmpModel, reach: Vector, shift: float
+            stage: WholeBodyStage, zmp: ZmpModel, reach: Vector, shift: float, polygons: tuple[SupportPolygon, ...]
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
                 self._com.value[:2],
@@ -128,21 +131,21 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(self._need_stage, model, full_pace, FREE_SHIFT)
+            wish, _ = stage_2(self._need_stage, model, full_pace, FREE_SHIFT, calm_polygons)
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
-                    need_of(wish, height, model, polygons=polygons, mass=mass, exact=exact),
+                    need_of(wish, height, model, polygons=calm_polygons, mass=mass, exact=exact),
                     goal=references.goal_com,
                     palms=self._palms,
                     hand_taken=references.hands_taken(),
-                    polygon=polygons[-1],
+                    polygon=calm_polygons[-1],
                     events=events,
                 )
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(self._motion_stage, model, gated, 0.0)
+        motion, solution = stage_2(self._motion_stage, model, gated, 0.0, polygons)
         stage2 = _stage_report(solution, begin)
 
         failed = np.full((preview.steps, 3), np.nan)
@@ -207,7 +210,7 @@ class Planner:
             soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone
         )
 
-    def _polygon(self) -> SupportPolygon:
+    def _polygon(self, *, alarm: float) -> SupportPolygon:
         """Support polygon of the soles, its inset smaller the louder the alarm."""
         settings, half_extents = self._settings.whole_body, self._robot.sole_half_extents
         corners = np.vstack(
@@ -216,7 +219,7 @@ class Planner:
                 for sole, yaw in zip(self._soles, self._yaws, strict=True)
             ]
         )
-        margin = settings.zmp_margin + self._com.alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+        margin = settings.zmp_margin + alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
         return SupportPolygon.of_corners(corners, margin=margin, plane_height=float(self._soles[:, 2].mean()))
 
     def _plan_height(self, wanted: Vector, band: Vector, polygon: SupportPolygon) -> tuple[HeightPlan, QpSolution]:
