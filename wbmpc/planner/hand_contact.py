@@ -13,6 +13,7 @@ from wbmpc.signals import ContactPhase, HandMode, Vector
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
+SHORTEST = 0.4  # [s] least time of a careful approach
 LAST_AIM = 0.02  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
 TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
@@ -125,11 +126,17 @@ class HandContact:
         pace = self._pace = Pace.of(self._settings, self._urgency)
         clearance = patch.position + (self._radius + pace.clearance) * patch.normal
         self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)
-        self._duration = max(pace.shortest, float(np.linalg.norm(clearance - palm)) / pace.speed)
+        self._duration = max(SHORTEST, float(np.linalg.norm(clearance - palm)) / self._settings.approach_speed)
         self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
         self._enter(ContactPhase.CHOSEN)
         self._landing = None
         if pace.hurried:
+            self._duration = Landing.shortest(
+                way=clearance - palm,
+                velocity=palm_velocity,
+                arrival=-pace.touch_speed * patch.normal,
+                acceleration=self._settings.urgent_acceleration,
+            )
             self._aim(palm, palm_velocity)
 
     def release(self, *, palm: Vector, home: Vector) -> None:

@@ -80,6 +80,19 @@ class Landing:
     arrival: Vector  # (3,) [m/s] at the end
     duration: float  # [s] > 0
 
+    @staticmethod
+    def shortest(*, way: Vector, velocity: Vector, arrival: Vector, acceleration: float) -> float:
+        """Shortest duration [s] in which neither end asks for more than `acceleration` [m/s²] along the way (3,) [m].
+
+        Along the way, a(0) T² = 6 d − (4 v₀ + 2 v₁) T and −a(T) T² = 6 d − (2 v₀ + 4 v₁) T.
+        """
+        d = float(np.linalg.norm(way))
+        if d < 1e-9:
+            return 0.0
+        v0, v1 = float(velocity @ way) / d, float(arrival @ way) / d
+        halves = (2.0 * v0 + v1, v0 + 2.0 * v1)
+        return max(float(np.sqrt(h * h + 6.0 * d * acceleration) - h) / acceleration for h in halves)
+
     def at(self, time: float) -> tuple[Vector, Vector, Vector]:
         """Position (3,) [m], velocity [m/s] and acceleration [m/s²] at `time` [s]."""
         T = self.duration

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 from wbmpc.planner.settings import ContactSettings
 
-UNHURRIED_TIME, HURRIED_TIME = 0.4, 0.1  # [s] shortest approach
 ARRIVED, ROUGHLY_ARRIVED = 0.012, 0.05  # [m] palm error at the clearance point below which the descent begins
 
 
@@ -15,8 +14,6 @@ class Pace:
     """Speeds and times of one approach, between the careful (urgency 0) and the urgent (1) end of the settings."""
 
     urgency: float  # 0 … 1
-    speed: float  # [m/s] mean speed of the palm on its way
-    shortest: float  # [s] least time of the way
     clearance: float  # [m] distance from the surface at which the way ends and the descent begins
     arrived: float  # [m] palm error there that is small enough
     touch_speed: float  # [m/s] of the descent
@@ -36,8 +33,6 @@ class Pace:
 
         return cls(
             urgency=urgency,
-            speed=between(settings.approach_speed, settings.urgent_speed),
-            shortest=between(UNHURRIED_TIME, HURRIED_TIME),
             clearance=between(settings.approach_clearance, 0.0),
             arrived=between(ARRIVED, ROUGHLY_ARRIVED),
             touch_speed=between(settings.touch_speed, settings.urgent_touch_speed),

@@ -111,10 +111,15 @@ class Planner:
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage, zmp: ZmpModel, reach: Vector, shift: float, polygons: tuple[SupportPolygon, ...]
+            stage: WholeBodyStage,
+            state: Vector,
+            zmp: ZmpModel,
+            reach: Vector,
+            shift: float,
+            polygons: tuple[SupportPolygon, ...],
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
-                self._com.value[:2],
+                state[:2],
                 zmp=zmp,
                 polygons=polygons,
                 com_reference=com_reference,
@@ -131,7 +136,7 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(self._need_stage, model, full_pace, FREE_SHIFT, calm_polygons)
+            wish, _ = stage_2(self._need_stage, self._com.anticipated, model, full_pace, FREE_SHIFT, calm_polygons)
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
@@ -145,7 +150,7 @@ class Planner:
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(self._motion_stage, model, gated, 0.0, polygons)
+        motion, solution = stage_2(self._motion_stage, self._com.value, model, gated, 0.0, polygons)
         stage2 = _stage_report(solution, begin)
 
         failed = np.full((preview.steps, 3), np.nan)
