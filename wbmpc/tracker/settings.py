@@ -53,6 +53,11 @@ class TrackerSettings(StrictModel):
         0.01, ge=0, description="[m] inset within which the centre of pressure stays unless it must save the balance"
     )
     foot_comfort_weight: float = Field(300.0, gt=0, description="[cost / (N·m)²] price of leaving the comfort inset")
+    trunk_clearance: float = Field(0.08, ge=0, description="[m] of an arm's axis from the trunk's")
+    elbow_clearance: float = Field(0.025, description="[m] of an elbow over the plane its palm rests on, palm's centre")
+    clearance_stiffness: float = Field(400.0, ge=0, description="[1/s²]")
+    clearance_damping: float = Field(40.0, ge=0, description="[1/s]")
+    clearance_weight: float = Field(50.0, gt=0, description="[cost / (m/s²)²] price of an arm too near")
     joint_velocity_limit: float = Field(5.0, gt=0, description="[rad/s]")
     limit_horizon: float = Field(0.025, gt=0, description="[s] within which a joint may stop before its limit")
     torque_share: float = Field(0.95, gt=0, le=1, description="share of the servo's torque that may be planned")

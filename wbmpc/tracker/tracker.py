@@ -12,6 +12,7 @@ from wbmpc.qp import QuadraticProgram, make_workspace
 from wbmpc.robot import Robot
 from wbmpc.rotations import contact_frame
 from wbmpc.signals import RobotState, Setpoint, TorqueCommand, Vector
+from wbmpc.tracker.clearance import CLEARANCE_ROWS, Clearance
 from wbmpc.tracker.constraints import (
     PALM_ROWS,
     PRESSURE_ROWS,
@@ -35,7 +36,8 @@ class Tracker:
     subject to  M v̇ + h = [0; τ] + J_cᵀ F     floating base and joints,
                 W F ≤ 0                        wrench cones of the soles, friction pyramids of the palms,
                 τ_low(q̇) ≤ τ ≤ τ_high(q̇)       the servo's torque-speed line (soft, then clipped),
-                q̈_low ≤ q̈ ≤ q̈_high             joint position and speed limits.
+                q̈_low ≤ q̈ ≤ q̈_high             joint position and speed limits,
+                C v̇ ≥ c                         arms off the trunk and off the wall (soft).
 
     The six base rows give v̇_base = M_bb⁻¹ (J_cbᵀ F − h_b − M_bj q̈), which eliminates them; the unknowns are
     y = (q̈ (nj), F (18)) and the torques follow from the joint rows.
@@ -58,12 +60,15 @@ class Tracker:
         self._torque_rows = slice(0, nj)
         self._palm_rows = slice(nj + 2 * WRENCH_ROWS, nj + 2 * WRENCH_ROWS + 2 * PALM_ROWS)
         comfort_rows = slice(self._palm_rows.stop, self._palm_rows.stop + 2 * PRESSURE_ROWS)
-        rows = comfort_rows.stop
+        self._clearance_rows = slice(comfort_rows.stop, comfort_rows.stop + CLEARANCE_ROWS)
+        self._clearance = Clearance(robot, settings)
+        rows = self._clearance_rows.stop
         soft = np.zeros(rows)
+        soft[self._clearance_rows] = settings.clearance_weight
         soft[self._torque_rows] = TORQUE_SLACK_COST
         soft[comfort_rows] = settings.foot_comfort_weight
         self.problem = QuadraticProgram(nj + FORCES, rows, soft_weight=soft)
-        self.problem.upper[nj:] = 0.0
+        self.problem.upper[nj : self._clearance_rows.start] = 0.0
         wrench_rows = sole_wrench_rows(
             half_extents=robot.sole_half_extents - settings.foot_inset,
             friction=settings.foot_friction,
@@ -95,6 +100,7 @@ class Tracker:
         kinematics, nj = self._kinematics, self._robot.nj
         kinematics.update(state.q, state.v)
         self._tasks.build(kinematics, state.v, setpoint)
+        self._clearance.build(kinematics, state.v, setpoint)
         self._contacts(kinematics, setpoint)
         self._torque_bounds = lower, upper = self._limits.torque(state.v[6:])
         base_offset = self._assemble(state, setpoint)
@@ -214,5 +220,11 @@ class Tracker:
         lower, upper = self._torque_bounds
         np.subtract(lower, self._torque_offset, out=qp.lower[self._torque_rows])
         np.subtract(upper, self._torque_offset, out=qp.upper[self._torque_rows])
+
+        clearance = self._clearance
+        rows = qp.matrix[self._clearance_rows]
+        np.matmul(clearance.matrix[:, :6], base_map, out=rows)
+        rows[:, :nj] += clearance.matrix[:, 6:]
+        qp.lower[self._clearance_rows] = clearance.lower - clearance.matrix[:, :6] @ base_offset
         qp.x_lower[:nj], qp.x_upper[:nj] = self._limits.acceleration(position, velocity)
         return base_offset
