@@ -14,7 +14,7 @@ PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the cand
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
 SHORTEST = 0.4  # [s] least time of a careful approach
-LAST_AIM = 0.02  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
+LAST_AIM = 0.03  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
 TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
 
@@ -90,7 +90,8 @@ class HandContact:
         assert self._path is not None
         assert self.patch is not None
         if self._landing is not None and self.hurried:
-            return self._landing.at(0.0)
+            position, velocity, acceleration = self._landing.at(0.0)
+            return position, velocity, self._possible(acceleration)
         if self._descent >= 0.0:
             moving = self._descent < self._pace.clearance + self._settings.search_depth
             normal = self.patch.normal
@@ -260,6 +261,15 @@ class HandContact:
             arrival=-self._pace.touch_speed * normal,
             duration=left,
         )
+
+    def _possible(self, acceleration: Vector) -> Vector:
+        """What an arm can give of a wanted acceleration (3,) [m/s²]: meeting the surface softly comes before where."""
+        assert self.patch is not None
+        normal, most = self.patch.normal, self._settings.urgent_acceleration
+        along = float(acceleration @ normal)
+        across = acceleration - along * normal
+        across *= min(1.0, most / max(float(np.linalg.norm(across)), 1e-9))
+        return across + min(max(along, -1.5 * most), 1.5 * most) * normal
 
     def _descend_again(self, palm: Vector) -> None:
         assert self.patch is not None

@@ -286,6 +286,7 @@ class Planner:
             hand_position=palm_position,
             hand_velocity=palm_velocity,
             hand_acceleration=palm_acceleration,
+            hand_urgency=np.array([float(c.hurried) for c in contacts]),
             hand_force=report.contact_force[:, 0],
             hand_force_cap=caps[:, 0],
             hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / self._period,
