@@ -260,6 +260,7 @@ class HandContact:
             end=self.patch.position + self._radius * normal,
             arrival=-self._pace.touch_speed * normal,
             duration=left,
+            normal=normal,
         )
 
     def _possible(self, acceleration: Vector) -> Vector:

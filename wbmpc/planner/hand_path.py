@@ -79,6 +79,7 @@ class Landing:
     end: Vector  # (3,) [m]
     arrival: Vector  # (3,) [m/s] at the end
     duration: float  # [s] > 0
+    normal: Vector | None = None
 
     @staticmethod
     def shortest(*, way: Vector, velocity: Vector, arrival: Vector, acceleration: float) -> float:
@@ -99,8 +100,12 @@ class Landing:
         if time >= T:
             return self.end + (time - T) * self.arrival, self.arrival, np.zeros(3)
         way = (self.end - self.start) / T
-        a = (6.0 * way - 4.0 * self.velocity - 2.0 * self.arrival) / T
-        jerk = 6.0 * (self.velocity + self.arrival - 2.0 * way) / T**2
+        end_velocity = self.arrival
+        if self.normal is not None:  # free across the normal: 1.5 way − 0.5 v₀ ends without acceleration
+            free = 1.5 * way - 0.5 * self.velocity
+            end_velocity = self.arrival + free - float(free @ self.normal) * self.normal
+        a = (6.0 * way - 4.0 * self.velocity - 2.0 * end_velocity) / T
+        jerk = 6.0 * (self.velocity + end_velocity - 2.0 * way) / T**2
         return (
             self.start + time * (self.velocity + time * (a / 2.0 + time * jerk / 6.0)),
             self.velocity + time * (a + time * jerk / 2.0),
