@@ -13,6 +13,8 @@ from wbmpc.signals import ContactPhase, HandMode, Vector
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
+STOPPED_HEIGHT, STOPPED_SPEED = 0.012, 0.05  # [m], [m/s] a palm slower than this so near has touched
+STANDOFF = 0.004  # [m] above the surface at which it has its landing speed
 SHORTEST = 0.4  # [s] least time of a careful approach
 LAST_AIM = 0.03  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
@@ -193,7 +195,7 @@ class HandContact:
         if phase == ContactPhase.APPROACHING:
             if self._landing is not None and normal_force <= settings.sensed_force:
                 self._aim(palm, palm_velocity)
-            return self._approach(dt, palm=palm, normal_force=normal_force, needed=needed, home=home)
+            return self._approach(dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home)
         elif phase == ContactPhase.RELEASED:
             self._sigma += self._rate * dt
             if self._sigma <= 0.0:
@@ -223,14 +225,15 @@ class HandContact:
                 self._descend_again(palm)
         return None
 
-    def _approach(self, dt: float, *, palm: Vector, normal_force: float, needed: bool, home: Vector) -> str | None:
+    def _approach(self, dt: float, *, palm: Vector, palm_velocity: Vector, normal_force: float, needed: bool, home: Vector) -> str | None:
         settings = self._settings
         assert self.patch is not None
         assert self._path is not None
         if not needed and self._clock > 0.5:
             self.release(palm=palm, home=home)
             return None
-        if normal_force > settings.sensed_force and (self._descent >= 0.0 or self.hurried):
+        sensed = normal_force > settings.sensed_force and (self._descent >= 0.0 or self.hurried)
+        if sensed or (self.hurried and self._stopped(palm, palm_velocity)):
             self._touched = palm.copy()
             self._level, self._unloaded_clock = 0.0, 0.0
             self._enter(ContactPhase.SENSED)
@@ -249,18 +252,24 @@ class HandContact:
         self._descent = min(depth, self._descent + self._pace.touch_speed * dt)
         return None
 
+    def _stopped(self, palm: Vector, palm_velocity: Vector) -> bool:
+        """Whether something has stopped a palm that was to meet the surface in motion: a bounce between two plans."""
+        assert self.patch is not None
+        height = float((palm - self.patch.position) @ self.patch.normal) - self._radius
+        late = self._clock > 0.5 * self._duration
+        return late and height < STOPPED_HEIGHT and float(palm_velocity @ self.patch.normal) > -STOPPED_SPEED
+
     def _aim(self, palm: Vector, palm_velocity: Vector) -> None:
         """Aim an urgent approach anew from where the palm is; near the surface only its speed is still corrected."""
         assert self.patch is not None
         normal = self.patch.normal
-        left = max(self._duration - self._clock, LAST_AIM)
+        arrival = -self._pace.touch_speed * normal
+        left = self._duration - self._clock
+        height = STANDOFF if left > 0.0 else -0.5 * self._settings.search_depth
+        end = self.patch.position + (self._radius + height) * normal
+        left = max(left, LAST_AIM)
         self._landing = Landing(
-            start=palm.copy(),
-            velocity=palm_velocity.copy(),
-            end=self.patch.position + self._radius * normal,
-            arrival=-self._pace.touch_speed * normal,
-            duration=left,
-            normal=normal,
+            start=palm.copy(), velocity=palm_velocity.copy(), end=end, arrival=arrival, duration=left, normal=normal
         )
 
     def _possible(self, acceleration: Vector) -> Vector:

@@ -45,6 +45,7 @@ class TrackerSettings(StrictModel):
     posture_damping: float = Field(12.0, ge=0, description="[1/s]")
     posture_weight: float = Field(0.02, gt=0)
     hand_force_weight: float = Field(0.02, ge=0, description="[cost / N²] of a hand's force against its plan")
+    hand_force_rise: float = Field(6.0, gt=0, description="[N] by which a planned palm force may exceed the sensed one")
     force_regularization: float = Field(1e-4, gt=0, description="[cost / N²] of every contact force")
     acceleration_regularization: float = Field(1e-4, gt=0, description="[cost / (rad/s²)²] of every joint")
 

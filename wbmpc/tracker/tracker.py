@@ -26,6 +26,7 @@ from wbmpc.tracker.settings import TrackerSettings
 from wbmpc.tracker.tasks import CONTACT, TaskStack
 
 FORCES = 18  # two sole wrenches (6 each), then two palm forces (3 each), each in its contact's own frame
+SENSED_SHARE = 0.2  # per tick, of the filtered palm force
 FRICTION_SPEED = 0.1  # [rad/s] wanted speed from which a joint's dry friction is fully compensated
 TORQUE_SLACK_COST = 1e4  # [cost / (N·m)²]; what a violated row would ask is clipped by the servo's limit anyway
 
@@ -90,6 +91,7 @@ class Tracker:
         self._diagonal = np.zeros(nj + FORCES)
         self._reference = np.zeros(nj + FORCES)
         self._stacked = np.zeros((self._tasks.matrix.shape[0], nj + FORCES))
+        self._sensed = np.zeros(2)  # [N] filtered normal force of each braced palm
         self._torque = np.zeros(nj)
         self._torque_offset = np.zeros(nj)
         self._torque_bounds = self._limits.torque(np.zeros(nj))
@@ -101,7 +103,7 @@ class Tracker:
         kinematics.update(state.q, state.v)
         self._tasks.build(kinematics, state.v, setpoint)
         self._clearance.build(kinematics, state.v, setpoint)
-        self._contacts(kinematics, setpoint)
+        self._contacts(kinematics, setpoint, state.palm_force_in_world)
         self._torque_bounds = lower, upper = self._limits.torque(state.v[6:])
         base_offset = self._assemble(state, setpoint)
         solution = self._workspace.solve()
@@ -144,8 +146,11 @@ class Tracker:
             fallback=False,
         )
 
-    def _contacts(self, kinematics: Kinematics, setpoint: Setpoint) -> None:
-        """Contact Jacobians, force bounds, cones and force references, each in its contact's own frame."""
+    def _contacts(self, kinematics: Kinematics, setpoint: Setpoint, palm_force: Vector) -> None:
+        """Contact Jacobians, force bounds, cones and force references, each in its contact's own frame.
+
+        `palm_force` (2, 3) is sensed, in world [N].
+        """
         qp, nj, settings = self.problem, self._robot.nj, self._settings
         lower, upper = qp.x_lower[nj:], qp.x_upper[nj:]
         lower[:], upper[:] = 0.0, 0.0
@@ -165,12 +170,17 @@ class Tracker:
             palm = slice(12 + 3 * side, 15 + 3 * side)
             if int(setpoint.hand_mode[side]) != CONTACT:
                 self._contact_jacobian[palm] = 0.0
+                self._sensed[side] = 0.0
                 continue
             R = contact_frame(setpoint.hand_normal[side])
             self._contact_rotation[2 + side] = R
             self._contact_jacobian[palm] = R.T @ self._tasks.matrix[21 + 3 * side : 24 + 3 * side]
             lower[palm], upper[palm] = -np.inf, np.inf
-            lower[14 + 3 * side], upper[14 + 3 * side] = 0.0, setpoint.hand_force_cap[side]
+            sensed = float(palm_force[side] @ setpoint.hand_normal[side])
+            self._sensed[side] += SENSED_SHARE * (max(sensed, 0.0) - self._sensed[side])
+            # A palm that has bounced off would be thrown at the surface again by a force that nothing takes up.
+            most = min(float(setpoint.hand_force_cap[side]), self._sensed[side] + settings.hand_force_rise)
+            lower[14 + 3 * side], upper[14 + 3 * side] = 0.0, most
             first = self._palm_rows.start + side * PALM_ROWS
             qp.matrix[first : first + PALM_ROWS, nj + 12 + 3 * side : nj + 15 + 3 * side] = palm_force_rows(
                 setpoint.hand_friction[side]
