@@ -45,7 +45,7 @@ class TrackerSettings(StrictModel):
     posture_damping: float = Field(12.0, ge=0, description="[1/s]")
     posture_weight: float = Field(0.02, gt=0)
     hand_force_weight: float = Field(0.02, ge=0, description="[cost / N²] of a hand's force against its plan")
-    hand_force_rise: float = Field(6.0, gt=0, description="[N] by which a planned palm force may exceed the sensed one")
+    hand_force_rise: float = Field(8.0, gt=0, description="[N] by which a planned palm force may exceed the sensed one")
     force_regularization: float = Field(1e-4, gt=0, description="[cost / N²] of every contact force")
     acceleration_regularization: float = Field(1e-4, gt=0, description="[cost / (rad/s²)²] of every joint")
 
@@ -61,7 +61,7 @@ class TrackerSettings(StrictModel):
     clearance_stiffness: float = Field(400.0, ge=0, description="[1/s²]")
     clearance_damping: float = Field(40.0, ge=0, description="[1/s]")
     clearance_weight: float = Field(50.0, gt=0, description="[cost / (m/s²)²] price of an arm too near")
-    joint_velocity_limit: float = Field(5.0, gt=0, description="[rad/s]")
+    joint_velocity_limit: float = Field(4.6, gt=0, description="[rad/s]")
     limit_horizon: float = Field(0.025, gt=0, description="[s] within which a joint may stop before its limit")
     torque_share: float = Field(0.95, gt=0, le=1, description="share of the servo's torque that may be planned")
     fallback_damping: float = Field(0.05, ge=0, description="[N·m·s/rad] added to the last torque after a failed solve")
