@@ -18,12 +18,16 @@ duration: 3.0
 world:
   objects:
     table: {kind: box, size: [0.2, 0.6, 0.2], position: [0.3, 0.0]}
+    stair: {kind: box, size: [0.2, 0.6, 0.02], position: [-0.5, 0.0], walkable: true}
     ghost: {kind: box, size: [0.2, 0.6, 0.2], position: [0.3, 1.0], present: false}
 patches:
   on_table: {on: table}
-  on_ghost: {on: ghost, face: left}
+  on_ghost: {on: ghost, face: left, force_cap: 7.0}
 tasks:
   - {kind: reach, target: [0.4, 0.0, 0.3], arrive_by: 1.0, hold: 0.1, withdraw: 0.2}
+  - {kind: step, foot: right, target: [0.1, -0.05], start: 1.0, duration: 0.5}
+  - {kind: step, foot: left, target: [0.1, 0.05], start: 0.2, duration: 0.5}
+  - {kind: go, target: [0.5, 0.1], start: 1.5}
 plant: {mass_scale: 1.1}
 checks: [{kind: withdrawn}]
 """
@@ -41,7 +45,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-untyped-
 def test_every_geom_has_one_role(plant) -> None:  # type: ignore[no-untyped-def]
     _, model, facts = plant
     names = np.array(facts.geom_name)
-    assert set(names[~facts.geom_is_robot]) == {"floor", "table"}
+    assert set(names[~facts.geom_is_robot]) == {"floor", "table", "stair"}
     assert names[facts.geom_palm == 0].tolist() == ["left_palm_geom"]
     assert names[facts.geom_palm == 1].tolist() == ["right_palm_geom"]
     assert "left_foot" in names[facts.geom_foot == 0]
@@ -50,6 +54,8 @@ def test_every_geom_has_one_role(plant) -> None:  # type: ignore[no-untyped-def]
     assert facts.geom_is_robot[(facts.geom_foot >= 0) | (facts.geom_palm >= 0)].all()
     assert facts.patch_geoms == {"on_table": frozenset({model.geom("table").id}), "on_ghost": frozenset()}
     np.testing.assert_allclose(facts.patch_normal["on_ghost"], [0, 1, 0])
+    assert facts.patch_force_cap == {"on_table": 15.0, "on_ghost": 7.0}
+    assert set(names[facts.geom_walkable]) == {"floor", "stair"}
 
 
 def test_mass_limits_and_targets(plant) -> None:  # type: ignore[no-untyped-def]
@@ -57,6 +63,9 @@ def test_mass_limits_and_targets(plant) -> None:  # type: ignore[no-untyped-def]
     assert facts.mass == pytest.approx(1.1 * robot.mass)  # the true one, which the controller does not know
     assert (facts.duration, facts.timestep) == (3.0, 0.001)
     np.testing.assert_array_equal(facts.reach_targets, [[0.4, 0.0, 0.3]])
+    assert [side for side, _ in facts.step_targets] == [0, 1]  # in the order of time, not of the file
+    np.testing.assert_array_equal([target for _, target in facts.step_targets], [[0.1, 0.05], [0.1, -0.05]])
+    np.testing.assert_array_equal(facts.go_targets, [[0.5, 0.1]])
     assert facts.stall_torque.shape == facts.no_load_speed.shape == (len(facts.joint_name),)
 
 
@@ -74,6 +83,8 @@ def test_sole_corners_are_the_lower_corners_of_the_foot_boxes(plant) -> None:  #
         corners = facts.sole_vertices(data.qpos)
         for side, name in enumerate(("left_foot", "right_foot")):
             box, size = data.geom(name), model.geom(name).size
+            forward = box.xmat.reshape(3, 3)[:, 0]
+            assert (corners[side, :2] @ forward).min() > (corners[side, 2:] @ forward).max()  # front ones first
             signs = np.array([[x, y, -1] for x in (-1, 1) for y in (-1, 1)])
             expected = box.xpos + (signs * size) @ box.xmat.reshape(3, 3).T
             np.testing.assert_allclose(

@@ -9,8 +9,10 @@ import numpy as np
 
 from wbmpc.checks.context import Facts
 from wbmpc.robot import Robot
+from wbmpc.scenario.consistency import FLOOR
 from wbmpc.scenario.patches import PatchPose
 from wbmpc.scenario.schema.scenario import Scenario
+from wbmpc.scenario.schema.tasks import StepTask
 from wbmpc.signals import SIDES, Vector
 
 
@@ -29,6 +31,8 @@ def facts_of(model: mujoco.MjModel, robot: Robot, scenario: Scenario, patches: S
     for side, name in enumerate(SIDES):
         foot[model.geom_bodyid == model.site(f"{name}_sole").bodyid[0]] = side
         palm[model.geom(f"{name}_palm_geom").id] = side
+    walkable = {FLOOR} | {name for name, box in scenario.world.objects.items() if box.walkable}
+    steps = sorted((task for task in scenario.tasks if isinstance(task, StepTask)), key=lambda task: task.start)
     tasks = scenario.tasks
     return Facts(
         duration=scenario.duration,
@@ -38,11 +42,15 @@ def facts_of(model: mujoco.MjModel, robot: Robot, scenario: Scenario, patches: S
         geom_is_robot=model.body_rootid[model.geom_bodyid] == root,
         geom_foot=foot,
         geom_palm=palm,
+        geom_walkable=np.array([model.geom(geom).name in walkable for geom in range(model.ngeom)]),
         joint_name=robot.joint_names,
         stall_torque=robot.torque_limit,
         no_load_speed=robot.joint_speed,
         patch_geoms={patch.name: _geoms_of(model, patch.object) for patch in patches},
         patch_normal={patch.name: patch.normal for patch in patches},
+        patch_force_cap={patch.name: patch.force_cap for patch in patches},
+        step_targets=tuple((SIDES.index(task.foot), np.array(task.target)) for task in steps),
+        go_targets=tuple(np.array(task.target) for task in tasks if task.kind == "go"),
         reach_targets=tuple(np.array(task.target) for task in tasks if task.kind == "reach"),
         com_heights=tuple((p.time, p.height) for task in tasks if task.kind == "com_height" for p in task.waypoints),
         sole_vertices=_sole_corners(model, robot),
@@ -59,7 +67,7 @@ def _geoms_of(model: mujoco.MjModel, name: str) -> frozenset[int]:
 
 
 def _sole_corners(model: mujoco.MjModel, robot: Robot) -> Callable[[Vector], Vector]:
-    """Function qpos (nq,) -> (2, 4, 3) [m], the corners of both soles in world."""
+    """Function qpos (nq,) -> (2, 4, 3) [m], the corners of both soles in world, front ones first."""
     data = mujoco.MjData(model)
     sites = [model.site(f"{side}_sole").id for side in SIDES]
     half_length, half_width = robot.sole_half_extents

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbmpc.checks.contacts import hand_contact_starts
 from wbmpc.checks.context import CheckContext
+from wbmpc.checks.hand_contacts import hand_contacts
 from wbmpc.signals import SolveStatus
 
 
@@ -18,7 +18,7 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
     depth = -recorder.contacts.distance
     palm_push = np.linalg.norm(context.palm_force, axis=2)  # (n, 2)
     stage3 = sum(plan.stage3.status != SolveStatus.NOT_RUN for plan in recorder.plans)
-    starts = hand_contact_starts(context)
+    hands = hand_contacts(context)
     return {
         "simulated_time": recorder.ticks * facts.timestep,
         "robot_mass": facts.mass,
@@ -30,8 +30,8 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
         "speed_peak_fraction": float((np.abs(recorder.qvel[:, 6 : 6 + joints]) / facts.no_load_speed).max()),
         "penetration_max": float(max(depth.max(initial=0.0), 0.0)),
         "hand_force_max": float(palm_push.max()),
-        "hand_contacts": float(len(starts)),
-        "first_hand_contact": starts[0] if starts else np.nan,
+        "hand_contacts": float(len(hands)),
+        "first_hand_contact": float(recorder.time[hands[0].start]) if hands else np.nan,
         "plans": float(len(recorder.plans)),
         "stage3_plans": float(stage3),
     }

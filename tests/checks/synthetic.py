@@ -47,6 +47,9 @@ class SyntheticRun:
         self.contacts: list[list[tuple[int, int, np.ndarray, float]]] = [[] for _ in range(ticks)]
         self.plans: list[Any] = []
         self.facts: dict[str, Any] = {}
+        self.sole_yaw = np.zeros((ticks, 2))  # [rad]
+        self.walkable = {FLOOR}
+        self.qpos[:, -1] = np.arange(ticks)  # a clock in the loose object's pose: `sole_vertices` sees qpos alone
         for foot in (LEFT_FOOT, RIGHT_FOOT):
             self.touch(range(ticks), FLOOR, foot, [0.0, 0.0, WEIGHT / 2])
 
@@ -100,8 +103,6 @@ class SyntheticRun:
         return CheckContext(recorder, self._facts())
 
     def _facts(self) -> Facts:
-        half_x, half_y = SOLE_HALF
-        corners = np.array([[x, y, 0.0] for x in (-half_x, half_x) for y in (-half_y, half_y)])
         facts: dict[str, Any] = {
             "duration": self.duration,
             "timestep": STEP,
@@ -114,6 +115,10 @@ class SyntheticRun:
             "stall_torque": np.array([2.0, 2.5]),
             "no_load_speed": np.array([5.0, 6.0]),
             "patch_geoms": {"table_1": frozenset({TABLE}), "table_2": frozenset({TABLE}), "wall_1": frozenset({WALL})},
+            "geom_walkable": np.isin(np.arange(8), list(self.walkable)),
+            "patch_force_cap": {"table_1": 8.0, "table_2": 6.0, "wall_1": 5.0},
+            "step_targets": (),
+            "go_targets": (),
             "patch_normal": {
                 "table_1": np.array([0.0, 0.0, 1.0]),
                 "table_2": np.array([0.0, 0.0, 1.0]),
@@ -121,9 +126,32 @@ class SyntheticRun:
             },
             "reach_targets": (TARGET,),
             "com_heights": (),
-            "sole_vertices": lambda qpos: SOLES[:, None] + corners,
+            "sole_vertices": self._corners,
         }
         return Facts(**{**facts, **self.facts})
+
+    def _corners(self, qpos: np.ndarray) -> np.ndarray:
+        """(2, 4, 3) [m] corners of both soles at the tick that `qpos` (16,) belongs to, front ones first."""
+        tick, (half_x, half_y) = int(qpos[-1]), SOLE_HALF
+        corners = np.array([[x, y] for x in (half_x, -half_x) for y in (half_y, -half_y)])
+        result = np.zeros((2, 4, 3))
+        for side, yaw in enumerate(self.sole_yaw[tick]):
+            turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+            result[side, :, :2] = corners @ turn.T
+        return result + self.sole_position[tick][:, None]
+
+    def step(self, foot: int, start: int, stop: int, displacement: Any = (0.0, 0.0), turn: float = 0.0) -> None:
+        """`foot` leaves the ground at tick `start` and lands at tick `stop`, displaced [m] and turned [rad]."""
+        side = (LEFT_FOOT, RIGHT_FOOT).index(foot)
+        self.lift(range(start, stop), foot)
+        share = np.clip((np.arange(self.ticks) - start) / (stop - start), 0.0, 1.0)
+        self.sole_position[:, side, :2] += share[:, None] * np.asarray(displacement)
+        self.sole_yaw[:, side] += share * turn
+
+    def lift(self, ticks: Any, foot: int) -> None:
+        """Take away every contact of the geom `foot` at `ticks`."""
+        for tick in ticks:
+            self.contacts[tick] = [contact for contact in self.contacts[tick] if foot not in contact[:2]]
 
 
 def _zeros(recorder: Recorder) -> list[dict[str, Any]]:

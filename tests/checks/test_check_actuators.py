@@ -12,9 +12,10 @@ from synthetic import MASS, STEP, SyntheticRun
 
 from wbmpc.checks import settings
 from wbmpc.checks.actuators import SpeedLimitCheck, TorqueLimitCheck, TorquePeakCheck
-from wbmpc.checks.push import PushRecoveryCheck, stretches
+from wbmpc.checks.push import PushRecoveryCheck
 from wbmpc.checks.result import CheckResult
 from wbmpc.checks.solvers import SolverFailuresCheck
+from wbmpc.checks.stretches import stretches
 from wbmpc.signals import SolveStatus
 
 
@@ -153,6 +154,9 @@ def test_every_push_counts_until_the_next_one() -> None:
     result = recovery(run)
     assert result.value == pytest.approx(0.7)
     assert "2.090" in result.message
+    assert "recovered in 0.20, 0.70 s" in result.message
+    run.com[210:, 0] += 0.1  # a step away from where it was pushed
+    assert recovery(run) == result
 
 
 @given(st.lists(st.booleans(), max_size=40))

@@ -6,7 +6,8 @@ import pytest
 from synthetic import FLOOR, LEFT_FOOT, LEFT_PALM, RIGHT_FOOT, RIGHT_PALM, TABLE, TORSO, WALL, SyntheticRun
 
 from wbmpc.checks import settings
-from wbmpc.checks.contacts import ContactPatchesCheck, DeclaredContactsCheck, PenetrationCheck
+from wbmpc.checks.contacts import DeclaredContactsCheck, PenetrationCheck
+from wbmpc.checks.hand_contacts import ContactPatchesCheck
 from wbmpc.checks.result import CheckResult
 from wbmpc.signals import ContactPhase, SolveStatus
 
@@ -33,17 +34,21 @@ def test_feet_and_a_chosen_palm_are_declared() -> None:
     assert declared(braced_run(), release_time=0.1).passed
 
 
-def test_feet_on_an_object_and_objects_among_themselves_are_declared() -> None:
+def test_feet_on_a_walkable_object_and_objects_among_themselves_are_declared() -> None:
     run = SyntheticRun()
     run.touch(range(10), TABLE, LEFT_FOOT, UP)
     run.touch(range(10), FLOOR, TABLE, UP)
+    run.walkable |= {TABLE}
     assert declared(run).passed
+    run.touch(range(20, 30), FLOOR, RIGHT_PALM, UP)  # walkable is for feet
+    assert declared(run).first_violation == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(
     ("pair", "words"),
     [
         ((TABLE, TORSO), "torso – table"),
+        ((TABLE, LEFT_FOOT), "left_foot – table"),  # a sill is not made for walking
         ((TORSO, WALL), "torso – wall"),
         ((FLOOR, RIGHT_PALM), "right_palm – floor"),
         ((TABLE, LEFT_PALM), "left_palm – table"),  # chosen for the right hand only

@@ -9,8 +9,12 @@ from hypothesis import strategies as st
 from synthetic import LEFT_FOOT, LEFT_PALM, RIGHT_FOOT, RIGHT_PALM, TABLE, TARGET, WALL, WEIGHT, SyntheticRun
 
 from wbmpc.checks import settings
-from wbmpc.checks.reach import BraceForceCheck, ComBeyondToesCheck, ReachCheck, best_hold, distance_outside
+from wbmpc.checks.balance import ComBeyondToesCheck
+from wbmpc.checks.hand_forces import BraceForceCheck
+from wbmpc.checks.hold import best_hold
+from wbmpc.checks.reach import ReachCheck
 from wbmpc.checks.result import CheckResult
+from wbmpc.checks.support import distance_outside
 from wbmpc.signals import ContactPhase
 
 HOLD = slice(100, 151)  # 0.5 s: 51 ticks
@@ -166,3 +170,37 @@ def test_a_wall_counts_along_its_own_normal_and_an_unchosen_contact_not_at_all()
     run.touch(range(90, 160), WALL, LEFT_PALM, [0.0, -0.25 * WEIGHT, 1.0])
     run.touch(range(90, 160), TABLE, RIGHT_PALM, [0.0, 0.0, WEIGHT])
     assert brace(run).value == pytest.approx(0.25)
+
+
+def leaning_run() -> SyntheticRun:
+    """No reach; the CoM is beyond the toes from 0.9 s to 1.6 s, farthest from 1.0 s to 1.5 s, and briefly at 2 s."""
+    run = braced(0.2)
+    run.facts["reach_targets"] = ()
+    run.com[90:161, 0] = 0.06 + 0.035
+    run.com[HOLD, 0] = 0.06 + 0.040
+    run.com[200:240, 0] = 0.3  # for less than the hold
+    return run
+
+
+def test_without_a_reach_the_hold_is_where_the_com_leans_farthest() -> None:
+    result = beyond(leaning_run())
+    assert result.passed
+    assert result.value == pytest.approx(0.040)
+    assert "t = 1.00 s" in result.message
+    assert brace(leaning_run()).value == pytest.approx(0.2)
+    run = leaning_run()
+    run.lift([130], RIGHT_PALM)
+    assert brace(run).value == 0.0
+    upright = leaning_run()
+    upright.com[:, 0] = 0.0
+    assert beyond(upright).value == pytest.approx(-0.06)
+
+
+def test_without_a_reach_and_without_feet_nothing_is_outside() -> None:
+    run = leaning_run()
+    run.lift(range(300), LEFT_FOOT)
+    run.lift(range(300), RIGHT_FOOT)
+    assert "no foot" in beyond(run).message
+    short = SyntheticRun(50)
+    short.facts["reach_targets"] = ()
+    assert np.isnan(beyond(short).value)

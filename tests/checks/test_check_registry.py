@@ -33,13 +33,25 @@ def test_every_kind_can_be_evaluated_and_answers_under_its_name() -> None:
         settings.ComHeight(kind="com_height", max=0.01),
         settings.UprightAtEnd(kind="upright_at_end"),
         settings.PushRecovery(kind="push_recovery", min_impulse=0.4),
+        settings.Footsteps(kind="footsteps", min_count=1),
+        settings.Travelled(kind="travelled", forward=(0.5, 0.6)),
+        settings.Arrived(kind="arrived", tolerance=0.03),
+        settings.FootMoved(kind="foot_moved", foot="left", tolerance=0.02),
+        settings.ComOutsideStance(kind="com_outside_stance", min=0.05),
+        settings.ContactSequence(kind="contact_sequence", min_contacts=2),
+        settings.BothHands(kind="both_hands", min=0.1, hold=0.2),
+        settings.HandImpact(kind="hand_impact", max=1.5),
+        settings.HandForceCaps(kind="hand_force_caps", margin=1.0),
+        settings.HandsFreeAtEnd(kind="hands_free_at_end"),
     ]
     results = evaluate_checks(run.context(), universal=settings.UniversalSettings(), checks=checks)
     assert [result.name for result in results] == list(CHECKS)
     universal = results[: len(settings.UniversalSettings.model_fields)]
     assert all(result.passed for result in universal)
     failing = {result.name for result in results if not result.passed}
-    assert failing == {"reach", "com_beyond_toes", "brace_force", "com_height", "push_recovery"}
+    of_motion = {"footsteps", "travelled", "arrived", "foot_moved", "com_outside_stance"}
+    of_hands = {"reach", "brace_force", "contact_sequence", "both_hands"}
+    assert failing == {"com_beyond_toes", "com_height", "push_recovery"} | of_motion | of_hands
 
 
 def test_names_are_kept_and_made_unique() -> None:

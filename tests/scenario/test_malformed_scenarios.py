@@ -12,6 +12,12 @@ from hypothesis import strategies as st
 from wbmpc.errors import ScenarioError
 from wbmpc.scenario import load_scenario
 
+
+def second_task(task: str) -> str:
+    """The base text with one more task in flow style."""
+    return edited("disturbances:", f"  - {task}\ndisturbances:")
+
+
 # (what is wrong, text, the part of the text where the problem must point, message)
 MISTAKES = [
     (
@@ -114,6 +120,82 @@ MISTAKES = [
         "tasks.0: ends at 14.5 s, the run already at 12 s (duration)",
     ),
     (
+        "walks too fast",
+        second_task("{kind: walk, commands: [{time: 1.0, velocity: [0.25, -0.25]}]}"),
+        "[0.25, -0.25]",
+        "tasks.1.commands.0.velocity: too fast: 0.353553 m/s, at most 0.3 m/s",
+    ),
+    (
+        "turns too fast",
+        second_task("{kind: walk, commands: [{time: 1.0, velocity: [0.1, 0.0], yaw_rate: -1.5}]}"),
+        "-1.5",
+        "tasks.1.commands.0.yaw_rate: must be ≥ -1, got -1.5",
+    ),
+    (
+        "walks without a command",
+        second_task("{kind: walk, commands: []}"),
+        "[]",
+        "tasks.1.commands: must have at least 1 item, got 0",
+    ),
+    (
+        "walking commands out of order",
+        second_task("{kind: walk, commands: [{time: 2.5, velocity: [0.1, 0.0]}, {time: 2.5, velocity: [0.0, 0.0]}]}"),
+        "2.5, velocity: [0.0",
+        "tasks.1.commands.1.time: must be later than the command before it (2.5 s), got 2.5 s",
+    ),
+    (
+        "walks after the end",
+        second_task("{kind: walk, commands: [{time: 12.5, velocity: [0.1, 0.0]}]}"),
+        "{kind: walk",
+        "tasks.1: ends at 12.5 s, the run already at 12 s (duration)",
+    ),
+    (
+        "steps with a hand",
+        second_task("{kind: step, foot: auto, target: [0.1, 0.05]}"),
+        "auto",
+        "tasks.1.foot: expected 'left' or 'right', got 'auto'",
+    ),
+    (
+        "steps at a place in space",
+        second_task("{kind: step, foot: left, target: [0.1, 0.05, 0.0]}"),
+        "[0.1, 0.05, 0.0]",
+        "tasks.1.target: expected 2 items, got 3",
+    ),
+    (
+        "swings for no time",
+        second_task("{kind: step, foot: left, target: [0.1, 0.05], duration: 0.0}"),
+        "0.0}\ndist",
+        "tasks.1.duration: must be > 0, got 0.0",
+    ),
+    (
+        "steps after the end",
+        second_task("{kind: step, foot: left, target: [0.1, 0.05], start: 11.0}"),
+        "{kind: step",
+        "tasks.1: ends at 13 s, the run already at 12 s (duration)",
+    ),
+    (
+        "steps with both feet at once",
+        second_task("{kind: step, foot: left, target: [0.1, 0.05], start: 2.0}").replace(
+            "disturbances:", "  - {kind: step, foot: right, target: [0.1, -0.05], start: 3.5}\ndisturbances:"
+        ),
+        "{kind: step, foot: right",
+        "tasks.2: begins at 3.5 s, but tasks.1 (step) moves the feet until 4 s",
+    ),
+    (
+        "goes while it walks",
+        second_task("{kind: go, target: [1.0, 0.0], start: 5.0}").replace(
+            "disturbances:", "  - {kind: walk, commands: [{time: 1.0, velocity: [0.1, 0.0]}]}\ndisturbances:"
+        ),
+        "{kind: go",
+        "tasks.1: begins at 5 s, but tasks.2 (walk) moves the feet until the run ends",
+    ),
+    (
+        "steps longer than the longest",
+        second_task("{kind: go, target: [1.0, 0.0], step_length: 0.1, longest_step: 0.09}"),
+        "0.09",
+        "tasks.1.longest_step: must not be less than step_length (0.1 m), got 0.09 m",
+    ),
+    (
         "push after the end",
         edited("time: 2.0", "time: 12.0"),
         "12.0, dur",
@@ -163,6 +245,44 @@ MISTAKES = [
         edited("allowed: [right]", "allowed: [rigt]"),
         "rigt",
         "checks.1.allowed.0: no patch 'rigt', did you mean 'right'?",
+    ),
+    (
+        "check of a task that is not there",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: arrived, tolerance: 0.03}"),
+        "arrived",
+        "checks.1.kind: needs a go task or a target",
+    ),
+    (
+        "check of the other foot",
+        second_task("{kind: step, foot: left, target: [0.1, 0.05]}").replace(
+            "{kind: contact_patches, allowed: [right]}", "{kind: foot_moved, foot: right, tolerance: 0.03}"
+        ),
+        "foot_moved",
+        "checks.1.kind: needs a step task of the right foot or a target",
+    ),
+    (
+        "window after the end",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: footsteps, min_count: 1, window: [2.0, 12.5]}"),
+        "[2.0, 12.5]",
+        "checks.1.window: ends at 12.5 s, the run already at 12 s (duration)",
+    ),
+    (
+        "window backwards",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: footsteps, min_count: 1, window: [2.0, 1.5]}"),
+        "{kind: footsteps",
+        "checks.1: 'window' needs its beginning first, got [2, 1.5]",
+    ),
+    (
+        "travels nowhere in particular",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: travelled, window: [1.0, 2.0]}"),
+        "{kind: travelled",
+        "checks.1: needs at least one of 'forward', 'left' and 'turned'",
+    ),
+    (
+        "range upside down",
+        edited("{kind: contact_patches, allowed: [right]}", "{kind: travelled, forward: [0.6, 0.5]}"),
+        "{kind: travelled",
+        "checks.1: 'forward' needs its lower bound first, got [0.6, 0.5]",
     ),
     (
         "unknown robot",
@@ -328,3 +448,13 @@ def _problems(path):
         assert error.problems  # noqa: PT017 - the property is about whatever is raised, if anything is
         return [str(problem) for problem in error.problems]
     return []
+
+
+def test_feet_may_be_asked_for_one_thing_after_another(tmp_path):
+    tasks = """\
+  - {kind: go, target: [1.0, 0.0], start: 9.0}
+  - {kind: step, foot: left, target: [0.1, 0.05], start: 3.0}
+  - {kind: step, foot: right, target: [0.1, -0.05], start: 5.0}
+  - {kind: walk, commands: [{time: 1.0, velocity: [0.1, 0.0]}, {time: 3.0, velocity: [0.0, 0.0]}]}
+"""
+    assert len(load_scenario(write(tmp_path, edited("disturbances:", tasks + "disturbances:"))).tasks) == 5

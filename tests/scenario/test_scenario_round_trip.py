@@ -29,7 +29,8 @@ BOXES = st.fixed_dictionaries(
         "size": triples(0.01, 2.0),
         "position": st.lists(numbers(-3, 3), min_size=2, max_size=2),
     },
-    optional={"bottom": numbers(0, 1), "yaw": numbers(-3, 3), "friction": numbers(0.1, 2), "present": st.booleans()},
+    optional={"bottom": numbers(0, 1), "yaw": numbers(-3, 3), "friction": numbers(0.1, 2), "present": st.booleans()}
+    | {"walkable": st.booleans()},
 )
 REACHES = st.builds(
     lambda target, start, travel, hand: {
@@ -47,6 +48,28 @@ REACHES = st.builds(
 HEIGHTS = st.lists(numbers(0.1, 9.0), min_size=1, max_size=4, unique=True).map(
     lambda times: {"kind": "com_height", "waypoints": [{"time": t, "height": 0.2 + t / 100} for t in sorted(times)]}
 )
+STEP_AND_GO = st.tuples(
+    st.fixed_dictionaries(
+        {"kind": st.just("step"), "foot": st.sampled_from(["left", "right"])}
+        | {"target": st.lists(numbers(-1, 1), min_size=2, max_size=2)},
+        optional={"yaw": numbers(-3, 3), "start": numbers(0, 2), "duration": numbers(0.1, 2)},
+    ),
+    st.fixed_dictionaries(
+        {"kind": st.just("go"), "target": st.lists(numbers(-1, 1), min_size=2, max_size=2), "start": numbers(4, 6)},
+        optional={"swing_time": numbers(0.1, 2), "step_length": numbers(0.01, 0.2), "longest_step": numbers(0.26, 0.5)},
+    ),
+)
+WALKS = st.lists(numbers(0.1, 9.0), min_size=1, max_size=4, unique=True).flatmap(
+    lambda times: st.tuples(
+        *(
+            st.fixed_dictionaries(
+                {"time": st.just(time), "velocity": st.lists(numbers(-0.2, 0.2), min_size=2, max_size=2)},
+                optional={"yaw_rate": numbers(-1, 1)},
+            )
+            for time in sorted(times)
+        )
+    ).map(lambda commands: ({"kind": "walk", "commands": list(commands)},))
+)
 PUSHES = st.fixed_dictionaries(
     {"kind": st.just("impulse"), "body": st.sampled_from(["torso", "arm"]), "time": numbers(0, 9)}
     | {"impulse": triples(-3, 3)}
@@ -61,7 +84,7 @@ def documents(draw: st.DrawFn) -> dict[str, object]:
     for name in draw(st.lists(NAMES, max_size=4, unique=True)) if objects else []:
         face = draw(st.sampled_from(["top", "bottom", "front", "back", "left", "right"]))
         patches[name] = {"on": draw(st.sampled_from(sorted(objects))), "face": face, "offset": [0.0, 0.004]}
-    tasks = [draw(REACHES), draw(HEIGHTS), {"kind": "stand"}]
+    tasks = [draw(REACHES), draw(HEIGHTS), {"kind": "stand"}, *draw(STEP_AND_GO | WALKS)]
     return {
         "name": draw(st.from_regex(r"\A[A-Za-z0-9][A-Za-z0-9_-]{0,12}\Z")),
         "description": draw(st.text(max_size=30)),
@@ -70,7 +93,7 @@ def documents(draw: st.DrawFn) -> dict[str, object]:
         "duration": 10.0,
         "world": {"floor": {"friction": draw(numbers(0.1, 2))}, "objects": objects},
         "patches": patches,
-        "tasks": draw(st.permutations(tasks))[: draw(st.integers(1, 3))],
+        "tasks": draw(st.permutations(tasks))[: draw(st.integers(1, 5))],
         "disturbances": draw(st.lists(PUSHES, max_size=2)),
         "plant": {"friction": draw(st.none() | numbers(0.1, 2)), "body_mass_scale": {"arm": draw(numbers(0.5, 2))}},
         "checks": [draw(CHECKS)],

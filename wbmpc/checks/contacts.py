@@ -1,4 +1,4 @@
-"""Checks of who touches what: declared pairs only, no deep penetration, the wanted number of hand contacts."""
+"""Checks of who touches what: declared pairs only, no deep penetration."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from numpy.typing import NDArray
 
 from wbmpc.checks import settings
 from wbmpc.checks.context import CheckContext
-from wbmpc.checks.posture import CONTACT_FORCE
-from wbmpc.checks.result import CheckResult, at_least, at_most, first_time
-from wbmpc.signals import SIDES, SolveStatus
-
-EPISODE_GAP = 0.2  # [s] a palm that loses its contact for less has kept the same contact
+from wbmpc.checks.result import CheckResult, at_most, first_time
+from wbmpc.signals import SIDES
 
 
 class DeclaredContactsCheck:
-    """Largest force of a contact that nobody declared: neither a foot on the world nor a chosen palm on its object."""
+    """Largest force of a contact that nobody declared: no foot where it may stand, no chosen palm on its object.
+
+    A foot may stand on the floor and on walkable objects, and touch these alone. Objects may touch one another.
+    """
 
     def __init__(self, config: settings.DeclaredContacts) -> None:
         self.config = config
@@ -24,8 +24,8 @@ class DeclaredContactsCheck:
         contacts, facts = context.recorder.contacts, context.facts
         robot_geom, other_geom, outside = context.contact_sides
         both_robot = facts.geom_is_robot[robot_geom] & facts.geom_is_robot[other_geom]
-        foot_on_world = outside & (facts.geom_foot[robot_geom] >= 0)
-        declared = ~(outside | both_robot) | foot_on_world | self._chosen_palm(context)
+        foot_on_ground = outside & (facts.geom_foot[robot_geom] >= 0) & facts.geom_walkable[other_geom]
+        declared = ~(outside | both_robot) | foot_on_ground | self._chosen_palm(context)
         force = np.linalg.norm(contacts.force, axis=1)  # (c,)
         undeclared = ~declared & ~(force <= self.config.min_force)
         if not undeclared.any():
@@ -76,42 +76,3 @@ class PenetrationCheck:
         message = f"deepest at {names[a]} – {names[b]}, t = {context.contact_time[worst]:.3f} s"
         when = first_time(context.contact_time, ~(depth <= self.config.max))
         return at_most(name, max(0.0, float(depth[worst])), self.config.max, "m", message, when=when)
-
-
-class ContactPatchesCheck:
-    """Number of hand contacts really made, and whether the planner chose only allowed patches.
-
-    With `max_count: 0` stage 3 must never have fired either.
-    """
-
-    def __init__(self, config: settings.ContactPatches) -> None:
-        self.config = config
-
-    def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        config, starts = self.config, hand_contact_starts(context)
-        chosen = sorted({patch for pair in context.patch_of_tick for patch in pair if patch})
-        message = f"{len(starts)} hand contacts made; chosen: {', '.join(chosen) or 'none'}"
-        fired = [plan.time for plan in context.recorder.plans if plan.stage3.status != SolveStatus.NOT_RUN]
-        if config.max_count == 0 and (fired or chosen):
-            when = fired[0] if fired else None
-            return CheckResult(name, False, float(len(starts)), 0.0, "1", f"{message}; stage 3 fired", when)
-        wrong = [patch for patch in chosen if config.allowed is not None and patch not in config.allowed]
-        if wrong:
-            when = first_time(context.time, [bool(set(pair) & set(wrong)) for pair in context.patch_of_tick])
-            message = f"{message}; not allowed: {', '.join(wrong)}"
-            return CheckResult(name, False, float(len(starts)), float(config.min_count), "1", message, when)
-        if config.max_count is not None and len(starts) >= config.min_count:
-            when = starts[config.max_count] if len(starts) > config.max_count else None
-            return at_most(name, float(len(starts)), float(config.max_count), "1", message, when=when)
-        return at_least(name, float(len(starts)), float(config.min_count), "1", message, when=None)
-
-
-def hand_contact_starts(context: CheckContext) -> list[float]:
-    """Times [s] at which a palm began to push on something, in order; short losses do not start a new contact."""
-    starts: list[float] = []
-    gap = context.ticks(EPISODE_GAP)
-    for side in range(len(SIDES)):
-        touching = np.linalg.norm(context.palm_force[:, side], axis=1) > CONTACT_FORCE  # (n,)
-        before = np.concatenate([[context.recorder.ticks + 1], 1 + _ticks_since(touching, context.recorder.ticks)[:-1]])
-        starts += context.time[touching & (before > gap)].tolist()
-    return sorted(starts)

@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 from wbmpc.recorder import Recorder
 from wbmpc.signals import GRAVITY, ContactPhase, Vector
 
+TOUCH = 0.01  # [N] a lighter contact is none
+CONTACT_FORCE = 0.3  # [N] lighter touches of a palm do not count as a contact made; the palms' sensing threshold
+SAMPLE_PERIOD = 0.01  # [s] the soles' corners are evaluated this often: they move slowly, and cost a kinematics
+
 
 @dataclass(frozen=True, slots=True)
 class Facts:
@@ -24,14 +28,20 @@ class Facts:
     geom_is_robot: NDArray[np.bool_]  # (ngeom,)
     geom_foot: NDArray[np.int64]  # (ngeom,) side index of the foot that the geom is part of, -1: not a foot
     geom_palm: NDArray[np.int64]  # (ngeom,) side index of the palm, -1: not a palm
+    geom_walkable: NDArray[np.bool_]  # (ngeom,) the floor, and the objects that a foot may stand on
     joint_name: tuple[str, ...]  # (nj,)
     stall_torque: Vector  # (nj,) [N·m]
     no_load_speed: Vector  # (nj,) [rad/s]
     patch_geoms: Mapping[str, frozenset[int]]  # geoms of the object that carries each candidate patch
     patch_normal: Mapping[str, Vector]  # (3,) out of the surface, in world
+    patch_force_cap: Mapping[str, float]  # [N] largest normal force that the planner may ask for
     reach_targets: tuple[Vector, ...]  # (3,) [m] in world, of the scenario's reach tasks
+    step_targets: tuple[tuple[int, Vector], ...]  # side index, (2,) [m] in world, of the step tasks in order of time
+    go_targets: tuple[Vector, ...]  # (2,) [m] in world, of the go tasks
     com_heights: tuple[tuple[float, float], ...]  # ([s], [m]) waypoints of the com_height task, above the floor
-    sole_vertices: Callable[[Vector], Vector]  # qpos (nq,) -> (2, k, 3) [m] corners of both soles in world
+    sole_vertices: Callable[
+        [Vector], Vector
+    ]  # qpos (nq,) -> (2, 4, 3) [m] corners of both soles in world, front ones first
 
 
 class CheckContext:
@@ -88,6 +98,21 @@ class CheckContext:
         return self._force_on(self.facts.geom_foot)
 
     @cached_property
+    def sole_touching(self) -> NDArray[np.bool_]:
+        """(n, 2) whether anything touches each foot."""
+        return np.linalg.norm(self.sole_force, axis=2) > TOUCH
+
+    @cached_property
+    def sample_ticks(self) -> NDArray[np.int64]:
+        """(m,) ticks at which `sole_corners` are known, one each `SAMPLE_PERIOD`."""
+        return np.arange(0, self.recorder.ticks, self.ticks(SAMPLE_PERIOD))
+
+    @cached_property
+    def sole_corners(self) -> Vector:
+        """(m, 2, 4, 3) [m] corners of both soles in world at `sample_ticks`, front ones first."""
+        return np.array([self.facts.sole_vertices(qpos) for qpos in self.recorder.qpos[self.sample_ticks]])
+
+    @cached_property
     def world_force(self) -> Vector:
         """(n, 3) [N] force of the whole world on the robot, from the plant's contacts."""
         _, _, outside = self.contact_sides
@@ -121,3 +146,20 @@ class CheckContext:
         ]
         per_plan.append(("", ""))  # index -1: before the first plan
         return [per_plan[index] for index in self.plan_of_tick]
+
+    @cached_property
+    def patch_codes(self) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+        """Names of all patches ever chosen, and (n, 2) the index among them of `patch_of_tick`, -1 when none."""
+        pairs = np.array(self.patch_of_tick).reshape(-1, 2)
+        names, code = np.unique(np.append(pairs, ""), return_inverse=True)  # sorted: "" comes first
+        return tuple(str(name) for name in names[1:]), code[:-1].reshape(-1, 2) - 1
+
+    @cached_property
+    def palm_push(self) -> Vector:
+        """(n, 2) [N] force on each palm along the normal of the patch chosen for it; 0 when none is."""
+        return self.push_along(self.patch_codes[1])
+
+    def push_along(self, code: NDArray[np.int64]) -> Vector:
+        """(n, 2) [N] force on each palm along the normal of the patch with index `code` (n, 2); 0 where that is -1."""
+        normals = np.array([*(self.facts.patch_normal[name] for name in self.patch_codes[0]), np.zeros(3)])
+        return np.einsum("nsx,nsx->ns", self.palm_force, normals[code])

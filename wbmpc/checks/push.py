@@ -9,13 +9,15 @@ import numpy as np
 from wbmpc.checks import settings
 from wbmpc.checks.context import CheckContext
 from wbmpc.checks.result import CheckResult, at_most, failed
+from wbmpc.checks.stretches import stretches
 from wbmpc.signals import Vector
 
 
 class PushRecoveryCheck:
     """max over pushes of the time from a push's end until the CoM stays slow, up to the next push or the end.
 
-    Every stretch of ticks with a declared external force is one push; its impulse is |Σ f_ext h|.
+    Every stretch of ticks with a declared external force is one push; its impulse is |Σ f_ext h|. Only the speed
+    counts: the robot may have stepped away from where it was pushed.
     """
 
     def __init__(self, config: settings.PushRecovery) -> None:
@@ -37,7 +39,8 @@ class PushRecoveryCheck:
         times = [_settling(speed[b:end], config.max_com_speed) * step for (_, b), end in zip(pushes, ends, strict=True)]
         worst = int(np.argmax(times))
         after = float(context.time[pushes[worst][1] - 1])
-        message = f"pushes of {listed} N·s/kg; slowest recovery after t = {after:.3f} s"
+        recovered = ", ".join(f"{time:.2f}" for time in times)
+        message = f"pushes of {listed} N·s/kg; recovered in {recovered} s; slowest after t = {after:.3f} s"
         return at_most(name, times[worst], config.max_time, "s", message, when=after)
 
 
@@ -47,9 +50,3 @@ def _settling(speed: Vector, bound: float) -> float:
     if fast.size == 0:
         return 0.0
     return math.inf if fast[-1] == speed.size - 1 else float(fast[-1] + 1)
-
-
-def stretches(active: Vector) -> list[tuple[int, int]]:
-    """[start, stop) of every run of true entries in `active` (n,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], np.asarray(active, dtype=np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]

@@ -6,15 +6,26 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from wbmpc.checks.actuators import SpeedLimitCheck, TorqueLimitCheck, TorquePeakCheck
-from wbmpc.checks.contacts import ContactPatchesCheck, DeclaredContactsCheck, PenetrationCheck
+from wbmpc.checks.balance import ComBeyondToesCheck, ComOutsideStanceCheck
+from wbmpc.checks.contacts import DeclaredContactsCheck, PenetrationCheck
 from wbmpc.checks.context import CheckContext
+from wbmpc.checks.footsteps import FootstepsCheck
+from wbmpc.checks.hand_contacts import ContactPatchesCheck, ContactSequenceCheck
+from wbmpc.checks.hand_forces import (
+    BothHandsCheck,
+    BraceForceCheck,
+    HandForceCapsCheck,
+    HandImpactCheck,
+    HandsFreeAtEndCheck,
+)
 from wbmpc.checks.momentum import MomentumBalanceCheck
 from wbmpc.checks.posture import ComHeightCheck, CompletedCheck, NoFallCheck, UprightAtEndCheck, WithdrawnCheck
 from wbmpc.checks.push import PushRecoveryCheck
-from wbmpc.checks.reach import BraceForceCheck, ComBeyondToesCheck, ReachCheck
+from wbmpc.checks.reach import ReachCheck
 from wbmpc.checks.result import CheckResult, failed
 from wbmpc.checks.settings import CheckSettings, UniversalSettings
 from wbmpc.checks.solvers import SolverFailuresCheck
+from wbmpc.checks.whereabouts import ArrivedCheck, FootMovedCheck, TravelledCheck
 from wbmpc.strict import StrictModel
 
 
@@ -44,6 +55,16 @@ CHECKS: dict[str, Any] = {  # kind -> class; a class takes its own settings mode
     "com_height": ComHeightCheck,
     "upright_at_end": UprightAtEndCheck,
     "push_recovery": PushRecoveryCheck,
+    "footsteps": FootstepsCheck,
+    "travelled": TravelledCheck,
+    "arrived": ArrivedCheck,
+    "foot_moved": FootMovedCheck,
+    "com_outside_stance": ComOutsideStanceCheck,
+    "contact_sequence": ContactSequenceCheck,
+    "both_hands": BothHandsCheck,
+    "hand_impact": HandImpactCheck,
+    "hand_force_caps": HandForceCapsCheck,
+    "hands_free_at_end": HandsFreeAtEndCheck,
 }
 
 

@@ -8,7 +8,7 @@ from wbmpc.kinematics import Kinematics
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.whole_body import VelocityTasks
 from wbmpc.robot import Robot
-from wbmpc.rotations import level_frame, rotation_error
+from wbmpc.rotations import cross, level_frame, rotation_error
 from wbmpc.signals import SIDES, HandMode, Vector
 
 LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
@@ -61,17 +61,21 @@ class JointReference:
         vertical_velocity: float,
         soles: Vector,
         yaws: Vector,
+        sole_velocities: Vector,
         hands: list[tuple[Vector, Vector, HandMode]],
         posture: Vector,
+        torso_up: Vector,
     ) -> VelocityTasks:
         """Stage 2's velocity tasks at the reference.
 
         Args:
             com: planned CoM (3,) now [m].
             vertical_velocity: stage 1's ċ_z [m/s].
-            soles, yaws: where the stance feet are, (2, 3) [m] and (2,) [rad].
+            soles, yaws: where the feet are or should be in their swing, (2, 3) [m] and (2,) [rad].
+            sole_velocities: (2, 3) [m/s].
             hands: position [m], velocity [m/s] (3,) and mode of each hand.
             posture: (nj,) joint angles to be drawn to [rad].
+            torso_up: (3,) where the torso's own vertical should point, in world.
         """
         robot, settings, kinematics, nv = self._robot, self._settings, self._kinematics, self._robot.nv
         kinematics.update_kinematics(self.q)
@@ -84,7 +88,9 @@ class JointReference:
             level = level_frame(yaws[side])
             rows = slice(6 * side, 6 * side + 6)
             foot_jacobian[rows] = kinematics.jacobian(frame)
-            foot_velocity[6 * side : 6 * side + 3] = rate * (soles[side] - kinematics.position(frame))
+            foot_velocity[6 * side : 6 * side + 3] = sole_velocities[side] + rate * (
+                soles[side] - kinematics.position(frame)
+            )
             foot_velocity[6 * side + 3 : 6 * side + 6] = rate * rotation_error(
                 desired=level, measured=kinematics.rotation(frame)
             )
@@ -113,7 +119,7 @@ class JointReference:
             hand_velocity=hand_velocity,
             hand_active=active,
             torso_jacobian=kinematics.jacobian(robot.torso_frame)[3:],
-            torso_velocity=np.array([up[1], -up[0], 0.0]),
+            torso_velocity=settings.torso_rate * cross(up, torso_up),
             posture_velocity=posture_velocity,
             lower=lower,
             upper=upper,

@@ -8,24 +8,31 @@ from time import perf_counter
 import numpy as np
 
 from wbmpc.kinematics import Kinematics
+from wbmpc.planner.bands import height_band
 from wbmpc.planner.com_height import ComHeightStage, HeightPlan
 from wbmpc.planner.com_state import ComState
+from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
+from wbmpc.planner.footholds import Footholds
+from wbmpc.planner.footstep import Feet
+from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.plan import Plan
 from wbmpc.planner.preview import Preview
-from wbmpc.planner.references import References, height_band
+from wbmpc.planner.references import References
 from wbmpc.planner.settings import PlannerSettings
-from wbmpc.planner.support import SupportPolygon, foot_corners
+from wbmpc.planner.stepping import Stepping
+from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
-from wbmpc.planner.zmp_model import free_model, loaded_model, need_of
+from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
-from wbmpc.scenario import PatchPose, Task
+from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
 
-FREE_SHIFT = 1.0  # [m] bound on ΔZ when the need is asked for
+GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
+STRIDE_ITERATIONS = 50  # when a stride is asked for: half-finished postures would call for contacts
 
 
 class Planner:
@@ -46,6 +53,7 @@ class Planner:
         *,
         tasks: tuple[Task, ...],
         patches: tuple[PatchPose, ...],
+        obstacles: tuple[Obstacle, ...] = (),
         q: Vector,
         period: float,
     ) -> None:
@@ -54,20 +62,23 @@ class Planner:
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
         self._need_stage, self._motion_stage = (
-            WholeBodyStage(self._preview, robot.nv, settings.whole_body, backend=settings.qp_backend) for _ in range(2)
+            WholeBodyStage(self._preview, robot.nv, settings.whole_body, backend=settings.qp_backend, ask_shift=ask)
+            for ask in (True, False)
         )
         measured = self._measured = Kinematics(robot)
         measured.update_kinematics(q)
-        self._soles = np.array([measured.position(f) for f in robot.sole_frames])
-        self._yaws = np.array([_yaw(measured.rotation(f)) for f in robot.sole_frames])
+        stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
+        self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
+        self._asked: Feet | None = None  # the feet from which the present stride goes
+        self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._palms = np.array([measured.position(f) for f in robot.palm_frames])
-        self._palm_homes = self._palms.copy()
+        self._palm_homes = self._in_torso(self._palms)  # where free hands hang
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
         self._references = References(robot, tasks, q=q, palms=self._palms, height=float(measured.com[2]), times=times)
         self._joints = JointReference(robot, settings.whole_body, q=q)
-        self._improve_postures(self._polygon(alarm=0.0).centre, iterations=FIRST_ITERATIONS, everyone=True)
+        self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
         self._time, self._elapsed = (
             0.0,
@@ -80,52 +91,48 @@ class Planner:
         events: list[str] = []
         settings, preview, contacts, references = self._settings, self._preview, self._contacts, self._references
         self._observe(state)
-        polygon = self._polygon(alarm=self._com.alarm)
-        growth = settings.whole_body.zmp_margin_growth
-        polygons = tuple(polygon.shrunk(growth * t) for t in preview.times)
-        # A hand takes its time: whether one is needed is judged by the usual inset, even when the feet use their edges.
-        calm = self._polygon(alarm=0.0)
-        calm_polygons = tuple(calm.shrunk(growth * t) for t in preview.times)
-        self._advance(state, polygon, events)
-        mass, plane, exact = state.mass_scale * self._robot.mass, polygon.plane_height, settings.formulation == "exact"
+        self._advance(state, events)
+        judged, gated_support = self._supports(state.time)
+        polygon = gated_support.polygons[0]
+        plane = polygon.plane_height
+        mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
 
-        full_pace, _ = references.palms(state.time, contacts, full_pace=True)
-        gated, sigma = references.palms(state.time, contacts, full_pace=False)
+        stride, times = self._gait.stride, preview.times
+        full_pace, full_sigma = references.palms(state.time, contacts, pace=1.0)
+        gated, sigma = references.palms(state.time, contacts)
+        foot, gated_foot = np.zeros(preview.steps), np.zeros(preview.steps)
+        if stride is not None:
+            foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
         begin = perf_counter()
-        band = height_band(settings.height, gated, polygon)
-        height, solution = self._plan_height(references.wanted_height(state.time, sigma), band, polygon)
+        band = height_band(settings.height, gated, plane)
+        height, solution = self._plan_height(
+            references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane
+        )
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._palms)
-        com_reference = np.tile(polygon.centre, (preview.steps, 1))
-        reach_distance = references.reach_distance(contacts)
+        soles, yaws, sole_velocity, sole_acceleration = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
-            soles=self._soles,
-            yaws=self._yaws,
+            soles=soles,
+            yaws=yaws,
+            sole_velocities=sole_velocity,
             hands=hands,
-            posture=references.posture(),
+            torso_up=references.torso_up(contacts),
+            posture=references.posture(contacts),
         )
         urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage,
-            state: Vector,
-            zmp: ZmpModel,
-            reach: Vector,
-            shift: float,
-            polygons: tuple[SupportPolygon, ...],
+            stage: WholeBodyStage, com: Vector, zmp: ZmpModel, support: SupportPreview, com_band: Vector
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
-                state[:2],
+                com[:2],
                 zmp=zmp,
-                polygons=polygons,
-                com_reference=com_reference,
-                reach=reach[:, :, :2],
-                reach_distance=reach_distance,
-                delta_z_limit=shift,
+                support=support,
+                com_band=com_band,
                 tasks=tasks,
                 velocity_time=self._period,
                 urgency=urgency,
@@ -136,22 +143,27 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(self._need_stage, self._com.anticipated, model, full_pace, FREE_SHIFT, calm_polygons)
+            full_band = references.com_band(contacts, full_pace, full_sigma, foot)
+            wish, _ = stage_2(self._need_stage, self._com.anticipated, model, judged, full_band)
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
-                    need_of(wish, height, model, polygons=calm_polygons, mass=mass, exact=exact),
-                    goal=references.goal_com,
+                    need_of(wish, height, model, polygons=judged.polygons, mass=mass, exact=exact),
+                    goal=self._goal_need(mass),
+                    binding=stride is not None,
                     palms=self._palms,
                     hand_taken=references.hands_taken(),
-                    polygon=calm_polygons[-1],
+                    polygon=judged.polygons[0],
                     events=events,
                 )
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(self._motion_stage, self._com.value, model, gated, 0.0, polygons)
+        com_band = references.com_band(contacts, gated, sigma, gated_foot)
+        motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
         stage2 = _stage_report(solution, begin)
+        if motion is not None:
+            self._footstep_shift = motion.footstep_shift
 
         failed = np.full((preview.steps, 3), np.nan)
         report = PlanReport(
@@ -173,7 +185,7 @@ class Planner:
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
-        self._last = self._make_plan(motion, height, hands, report)
+        self._last = self._make_plan(motion, height, hands, (soles, yaws, sole_velocity, sole_acceleration), report)
         return self._last
 
     # ------------------------------------------------------------------ steps of one plan
@@ -186,51 +198,108 @@ class Planner:
         if self._last is not None:
             self._elapsed = state.time - self._time
             planned = self._last.com_state(state.time)
-            plane = float(self._soles[:, 2].mean())
+            plane = float(self._gait.feet.positions[:, 2].mean())
             self._com.update(planned, measured=self._measured.com, height=float(planned[2, 0]) - plane)
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
 
-    def _advance(self, state: RobotState, polygon: SupportPolygon, events: list[str]) -> None:
-        """Tasks, contacts and the postures behind them one plan further."""
-        contacts, references = self._contacts, self._references
+    def _in_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return (points - self._measured.position(frame)) @ self._measured.rotation(frame)
+
+    def _from_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return self._measured.position(frame) + points @ self._measured.rotation(frame).T
+
+    def _measured_soles(self) -> Vector:
+        return np.array([self._measured.position(f) for f in self._robot.sole_frames])
+
+    def _measured_yaws(self) -> Vector:
+        rotations = (self._measured.rotation(f) for f in self._robot.sole_frames)
+        return np.array([np.arctan2(R[1, 0], R[0, 0]) for R in rotations])
+
+    def _advance(self, state: RobotState, events: list[str]) -> None:
+        """Steps, tasks, contacts and the postures behind them one plan further."""
+        contacts, references, dt = self._contacts, self._references, self._elapsed
         gate_open = contacts.gate_open
-        references.advance(state.time, self._elapsed, gate_open=gate_open, palms=self._palms, events=events)
+        self._gate = float(np.clip(self._gate + (dt if gate_open else -dt) / GATE_TIME, 0.0, 1.0))
+        self._gait.aim(self._footstep_shift[0], dt)
+        self._gait.advance(
+            state.time,
+            dt,
+            rate=self._gate,
+            soles=self._measured_soles(),
+            yaws=self._measured_yaws(),
+            loads=state.sole_wrench_in_world[:, 2],
+            events=events,
+        )
+        references.advance(
+            state.time, dt, gate_open=gate_open, palms=self._palms, com=self._measured.com, events=events
+        )
         contacts.advance(
-            self._elapsed,
+            dt,
             palms=self._palms,
             palm_velocities=np.array([self._measured.jacobian(f)[:3] @ state.v for f in self._robot.palm_frames]),
             palm_forces=state.palm_force_in_world,
-            homes=self._palm_homes,
+            homes=self._from_torso(self._palm_homes),
             urgency=self._com.alarm,
             events=events,
         )
-        self._improve_postures(polygon.centre, iterations=2)
+        asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
+        fresh = self._asked is not None and self._asked is not asked  # a stride from where the feet have not stood yet
+        self._improve_postures(iterations=STRIDE_ITERATIONS if fresh else 2)
 
-    def _improve_postures(self, centre: Vector, *, iterations: int, everyone: bool = False) -> None:
-        """Iterate the reach's posture and the next candidate's (or everyone's); `centre` (2,) is the support's [m]."""
-        soles, yaws = self._soles, self._yaws
-        self._references.update_goal(self._contacts, soles=soles, yaws=yaws, centre=centre, iterations=iterations)
-        self._contacts.candidates.refresh(
-            soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone
+    def _improve_postures(self, *, iterations: int, everyone: bool = False) -> None:
+        """Iterate the tasks' postures and the next candidate's (or everyone's)."""
+        feet, stride = self._gait.feet, self._gait.stride
+        centre = feet.positions[:, :2].mean(axis=0) if stride is None else stride.stance_centre
+        if stride is not None or self._gait.phase == SupportPhase.STAND:  # walking keeps the standing posture
+            self._references.update_postures(
+                self._contacts,
+                soles=feet.positions,
+                yaws=feet.yaws,
+                stride=stride,
+                centre=centre,
+                iterations=iterations,
+            )
+        self._contacts.improve_postures(
+            soles=feet.positions, yaws=feet.yaws, centre=centre, iterations=iterations, everyone=everyone
         )
 
-    def _polygon(self, *, alarm: float) -> SupportPolygon:
-        """Support polygon of the soles, its inset smaller the louder the alarm."""
-        settings, half_extents = self._settings.whole_body, self._robot.sole_half_extents
-        corners = np.vstack(
-            [
-                foot_corners(position=sole, yaw=yaw, half_extents=half_extents)
-                for sole, yaw in zip(self._soles, self._yaws, strict=True)
-            ]
-        )
+    def _goal_need(self, mass: float) -> Need | None:
+        """The need where the current task ends, on the feet that will carry it; None without such a task."""
+        com = self._references.goal_com
+        if com is None:
+            return None
+        margin = self._settings.whole_body.zmp_margin
+        polygon = self._gait.goal_polygon(half_extents=self._robot.sole_half_extents, margin=margin)
+        return need_at_rest(com, polygon=polygon, mass=mass)
+
+    def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
+        """Support to judge the need for a contact by, at full pace, and to move in, at the gate's.
+
+        The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
+        """
+        settings, alarm = self._settings.whole_body, self._com.alarm
         margin = settings.zmp_margin + alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
-        return SupportPolygon.of_corners(corners, margin=margin, plane_height=float(self._soles[:, 2].mean()))
 
-    def _plan_height(self, wanted: Vector, band: Vector, polygon: SupportPolygon) -> tuple[HeightPlan, QpSolution]:
+        def preview(rate: float, margin: float) -> SupportPreview:
+            return self._gait.preview(
+                time,
+                self._preview.times,
+                rate=rate,
+                margin=margin,
+                growth=settings.zmp_margin_growth,
+                half_extents=self._robot.sole_half_extents,
+            )
+
+        judged = preview(1.0, settings.zmp_margin)
+        return judged, judged if self._gate >= 1.0 and alarm == 0.0 else preview(self._gate, margin)
+
+    def _plan_height(self, wanted: Vector, band: Vector, plane: float) -> tuple[HeightPlan, QpSolution]:
         """Stage 1; when it fails or is turned off the height stays where it is."""
         settings, steps = self._settings.height, self._preview.steps
-        limits = np.tile([polygon.plane_height + settings.lowest, polygon.plane_height + settings.highest], (steps, 1))
+        limits = np.tile([plane + settings.lowest, plane + settings.highest], (steps, 1))
         plan, solution = self._height_stage.solve(self._com.value[2], wanted=wanted, limits=limits, band=band)
         if plan is None or not settings.enabled:
             self._com.value[2, 1:] = 0.0
@@ -243,6 +312,7 @@ class Planner:
         motion: HorizontalPlan | None,
         height: HeightPlan,
         hands: list[tuple[Vector, Vector, HandMode]],
+        feet: tuple[Vector, Vector, Vector, Vector],
         report: PlanReport,
     ) -> Plan:
         if motion is None and self._last is not None:
@@ -277,11 +347,11 @@ class Planner:
             velocity=velocity,
             torso_rotation=self._joints.torso_rotation,
             torso_angular_velocity=self._joints.torso_velocity(velocity),
-            foot_stance=np.ones(len(SIDES), dtype=bool),
-            foot_position=self._soles,
-            foot_yaw=self._yaws,
-            foot_velocity=zero,
-            foot_acceleration=zero,
+            foot_stance=np.array(self._gait.stance),
+            foot_position=feet[0],
+            foot_yaw=feet[1],
+            foot_velocity=feet[2],
+            foot_acceleration=feet[3],
             hand_mode=np.array([int(mode) for _, _, mode in hands]),
             hand_position=palm_position,
             hand_velocity=palm_velocity,
@@ -299,7 +369,3 @@ class Planner:
 
 def _stage_report(solution: QpSolution, start: float) -> StageReport:
     return StageReport(solution.status, perf_counter() - start, solution.iterations)
-
-
-def _yaw(rotation: Vector) -> float:
-    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))

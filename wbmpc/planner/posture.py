@@ -41,6 +41,11 @@ class Posture:
         self._step = np.inf  # [rad, m] largest change of the last iteration
         self._left = PATIENCE
 
+    @property
+    def torso_up(self) -> Vector:
+        """(3,) the torso's own vertical in world at the last iterate."""
+        return self._kinematics.rotation(self._robot.torso_frame)[:, 2]
+
     def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector) -> None:
         """Run `count` iterations.
 

@@ -29,13 +29,19 @@ class WholeBodySettings(StrictModel):
     """Stage 2: horizontal CoM, ΔZ and joint velocities."""
 
     jerk_cost: float = Field(1e-4, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
-    delta_z_cost: float = Field(0.2, gt=0, description="[cost / m²] α₂, the price of asking a contact for help")
+    delta_z_cost: float = Field(0.2, gt=0, description="[cost / m²] α₂, on the square of ΔZ")
+    delta_z_price: float = Field(2.0, ge=0, description="[cost / m] on |ΔZ|: help that is worth less is not asked for")
     joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
     com_velocity_cost: float = Field(1000.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
     hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
     velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(5e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
+    footstep_cost: float = Field(50.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
+    zmp_centre_cost: float = Field(
+        50.0, ge=0, description="[cost / m²] a ZMP off the centre of the foot that carries a step alone"
+    )
+    foot_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a foot where it must not be")
     zmp_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of a ZMP outside its bounds")
     rest_slack_cost: float = Field(1e4, gt=0, description="[cost / m²] price of a plan that cannot stop at its end")
     zmp_margin: float = Field(0.018, ge=0, description="[m] inset of the support polygon")
@@ -49,8 +55,27 @@ class WholeBodySettings(StrictModel):
         0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
     )
     posture_rate: float = Field(1.0, ge=0, description="[1/s] pull of the joint velocities to the nominal posture")
-    torso_cost: float = Field(0.02, ge=0, description="[cost / (rad/s)²] pull of the torso to upright")
+    torso_cost: float = Field(0.3, ge=0, description="[cost / (rad/s)²] of the torso's rate against its pull")
+    torso_rate: float = Field(4.0, ge=0, description="[1/s] pull of the torso to upright, or to a reach's posture")
     tracking_rate: float = Field(8.0, gt=0, description="[1/s] pull of the joint reference to its CoM, hands and feet")
+
+
+class GaitSettings(StrictModel):
+    """Steps: their timing, their size, the swing foot."""
+
+    swing_time: float = Field(0.5, gt=0.1, description="[s] single support of a walking step")
+    double_support: float = Field(0.15, gt=0.02, description="[s] between two walking steps")
+    first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
+    step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
+    step_width: float = Field(0.09, gt=0, description="[m] between the soles' centres when walking")
+    narrowest: float = Field(0.08, gt=0, description="[m] smallest such width")
+    widest: float = Field(0.20, gt=0, description="[m] largest such width")
+    longest: float = Field(0.14, gt=0, description="[m] largest distance of a foot ahead of or behind the other")
+    foot_speed: float = Field(0.8, gt=0, description="[m/s] how fast a swing foot's landing place may be moved")
+    adapt_footsteps: bool = Field(True, description="false fixes the footsteps where the task puts them")
+    landing_force: float = Field(4.0, gt=0, description="[N] normal force that counts as landed")
+    search_depth: float = Field(0.02, ge=0, description="[m] how far below the ground a late foot is lowered")
+    search_speed: float = Field(0.06, gt=0, description="[m/s] how fast")
 
 
 class ContactSettings(StrictModel):
@@ -75,6 +100,7 @@ class ContactSettings(StrictModel):
     shift_slack_cost: float = Field(1.0, gt=0, description="[cost / m²] price of a ΔZ that the force does not give")
     distance_cost: float = Field(0.4, ge=0, description="[cost / m] w_i per metre between the hand and candidate i")
     reach_margin: float = Field(0.005, ge=0, description="[m] IK residual up to which a candidate counts as reachable")
+    most_contacts: int = Field(2, ge=1, le=2, description="hands in contact at once, the paper's ΣH: 1 or 2")
     most_candidates: int = Field(16, ge=1, le=64, description="candidates that one firing considers, nearest first")
 
 
@@ -94,4 +120,5 @@ class PlannerSettings(StrictModel):
     feedback_knee: float = Field(0.005, gt=0, description="[m] capture-point error from which the share grows")
     height: HeightSettings = HeightSettings()
     whole_body: WholeBodySettings = WholeBodySettings()
+    gait: GaitSettings = GaitSettings()
     contact: ContactSettings = ContactSettings()

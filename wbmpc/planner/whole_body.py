@@ -1,4 +1,4 @@
-"""Stage 2: horizontal CoM jerks, the ZMP shift ΔZ and whole-body joint velocities in one QP ([M] eq. formul)."""
+"""Stage 2: CoM jerks, ZMP shift ΔZ, footsteps and whole-body joint velocities in one QP ([M] eq. formul, Herdt)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ import numpy as np
 
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings
-from wbmpc.planner.support import MAX_EDGES, SupportPolygon
+from wbmpc.planner.support import MAX_EDGES
+from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
 from wbmpc.signals import SolveStatus, Vector
 
 FOOT_ROWS = 12  # two soles, six rows each
+LARGEST_SHIFT = 1.0  # [m] bound on |ΔZ|
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,64 +55,74 @@ class HorizontalPlan:
     acceleration: Vector  # (N, 2) [m/s²]
     delta_z: Vector  # (N, 2) [m]
     zmp: Vector  # (N, 2) [m] of the feet: a c − b c̈ + j + ΔZ
+    footstep_shift: Vector  # (MAX_FOOTSTEPS, 2) [m] of the coming footsteps from their reference
     joint_velocity: Vector  # (nv,) [m/s, rad/s] q̇ in Pinocchio's tangent coordinates
 
 
 class WholeBodyStage:
-    """minimise  α₁|U|² + α₂|ΔZ|² + α₃|q̇ − q̇_posture|² + α₄|J_com q̇ − ċ|² + α₅ Σ|J_hand q̇ − V_hand|²
-                 + w_v|Ċ|² + w_p|C − C_ref|² + w_t|J_torso q̇ − ω_up|²
+    """minimise  α₁|U|² + α₂|ΔZ|² + p|ΔZ|₁ + α₃|q̇ − q̇_posture|² + α₄|J_com q̇ − ċ|² + α₅ Σ|J_hand q̇ − V_hand|²
+                 + w_v|Ċ − V_ref|² + w_p|C − C_ref|² + w_f|F − F_ref|² + w_t|J_torso q̇ − ω_up|²
 
-    over x = (U_x, U_y, ΔZ_x, ΔZ_y (N each), q̇ (nv)), subject to
+    over x = (U_x, U_y (N each), F − F_ref (x, y of MAX_FOOTSTEPS), q̇ (nv), ΔZ⁺, ΔZ⁻ (2N each)), subject to
 
-        A_k (Z_k + ΔZ_k) ≤ b_k          ZMP in the support polygon of knot k ([M] eq. ZMP-constraint), soft
-        A_N (a (c_N + √(b/a) ċ_N) + j + ΔZ_N) ≤ b_N   the plan can come to rest at its end, soft
-        |R_k − C_k| ≤ d                 reach of each active hand, per axis, soft
-        J_foot q̇ = v_foot               stance feet stay, swing feet follow
-        q̇_low ≤ q̇ ≤ q̇_high, |ΔZ| ≤ ΔZ_max.
+        A_k (Z_k + ΔZ_k − S_k (F − F_ref)) ≤ b_k      ZMP in the support of knot k, which moves with the footsteps, soft
+        A (a (c_N + √(b/a) ċ_N) + j + ΔZ_N − S (F − F_ref)) ≤ b   the plan can come to rest at its end, soft
+        C_low ≤ C_k ≤ C_high            reach of hands and feet, |R − C| ≤ d of each of them, per axis, soft
+        l ≤ R_jᵀ (F_j − F_{j−1}) ≤ u    where a foot may be put beside the other, soft
+        J_foot q̇ = v_foot               stance feet stay, swing feet follow, soft
+        q̇_low ≤ q̇ ≤ q̇_high.
 
-    ċ is the velocity of the first knot's plan at the end of `velocity_time`, so jerks and q̇ agree. All norms are
-    weighted squares; the last three cost terms are not printed in the paper (damping, a weak pull, upright torso), nor
-    is the row at the end of the horizon: without it a plan may keep every ZMP and still be falling over at knot N.
+    ċ is the velocity of the first knot's plan at the end of `velocity_time`, so jerks and q̇ agree. ΔZ = ΔZ⁺ − ΔZ⁻ is
+    there only when the stage is built to ask for it: its plain norm, as the paper prints it, leaves ΔZ at exactly 0 as
+    long as the robot can do without a contact. Otherwise all norms are weighted squares. The footsteps are Herdt's;
+    the last cost term and the row at the end of the horizon are not in the paper: without that row a plan may keep
+    every ZMP and still be falling over at knot N.
     """
 
-    def __init__(self, preview: Preview, velocities: int, settings: WholeBodySettings, *, backend: str) -> None:
-        n, nv = preview.steps, velocities
-        self._preview, self._settings, self._nv = preview, settings, nv
+    def __init__(
+        self, preview: Preview, velocities: int, settings: WholeBodySettings, *, backend: str, ask_shift: bool
+    ) -> None:
+        """`ask_shift`: ΔZ is a variable (to ask whether a contact is needed), or 0 (to execute)."""
+        n, nv, m = preview.steps, velocities, MAX_FOOTSTEPS
+        self._preview, self._settings, self._nv, self._ask = preview, settings, nv, ask_shift
         self._zmp_rows = slice(0, n * MAX_EDGES)
-        self._reach_rows = slice(n * MAX_EDGES, n * MAX_EDGES + 4 * n)  # left x, left y, right x, right y
-        self._foot_rows = slice(n * MAX_EDGES + 4 * n, n * MAX_EDGES + 4 * n + FOOT_ROWS)
-        self._rest_rows = slice(self._foot_rows.stop, self._foot_rows.stop + MAX_EDGES)
-        rows = self._rest_rows.stop
-        soft = np.zeros(rows)
-        soft[self._rest_rows] = settings.rest_slack_cost
+        self._rest_rows = slice(self._zmp_rows.stop, self._zmp_rows.stop + MAX_EDGES)
+        self._band_rows = slice(self._rest_rows.stop, self._rest_rows.stop + 2 * n)
+        self._step_rows = slice(self._band_rows.stop, self._band_rows.stop + 2 * m)
+        self._foot_rows = slice(self._step_rows.stop, self._step_rows.stop + FOOT_ROWS)
+        soft = np.zeros(self._foot_rows.stop)
         soft[self._zmp_rows] = settings.zmp_slack_cost
-        soft[self._reach_rows] = settings.reach_slack_cost
-        self.problem = QuadraticProgram(4 * n + nv, rows, soft_weight=soft)
-        self._u, self._dz, self._qd = slice(0, 2 * n), slice(2 * n, 4 * n), slice(4 * n, 4 * n + nv)
+        soft[self._rest_rows] = settings.rest_slack_cost
+        soft[self._band_rows] = settings.reach_slack_cost
+        soft[self._step_rows] = soft[self._foot_rows] = settings.foot_slack_cost
+        self._u, self._steps = slice(0, 2 * n), slice(2 * n, 2 * n + 2 * m)
+        self._qd = slice(self._steps.stop, self._steps.stop + nv)
+        shifts = slice(self._qd.stop, self._qd.stop + (4 * n if ask_shift else 0))
+        self._plus, self._minus = slice(shifts.start, shifts.start + 2 * n), slice(shifts.start + 2 * n, shifts.stop)
+        qp = self.problem = QuadraticProgram(shifts.stop, self._foot_rows.stop, soft_weight=soft)
         self._jerk_hessian = settings.jerk_cost * np.eye(n)
         self._return_hessian = (
             settings.velocity_cost * preview.P_vu.T @ preview.P_vu
             + settings.position_cost * preview.P_pu.T @ preview.P_pu
         )
-        self.problem.hessian[self._dz, self._dz] = settings.delta_z_cost * np.eye(2 * n)
+        qp.hessian[self._steps, self._steps] = settings.footstep_cost * np.eye(2 * m)
+        qp.hessian[shifts, shifts] = settings.delta_z_cost * np.eye(shifts.stop - shifts.start)
+        qp.gradient[shifts] = settings.delta_z_price
+        qp.x_lower[self._u], qp.x_upper[self._u] = -np.inf, np.inf
+        qp.x_lower[shifts], qp.x_upper[shifts] = 0.0, LARGEST_SHIFT
         for axis in range(2):
-            block = slice(axis * n, (axis + 1) * n)
-            for hand in range(2):
-                first = self._reach_rows.start + (2 * hand + axis) * n
-                self.problem.matrix[first : first + n, block] = preview.P_pu
+            first = self._band_rows.start + axis * n
+            qp.matrix[first : first + n, axis * n : (axis + 1) * n] = preview.P_pu
         self._knots = np.arange(n)
-        self._workspace = make_workspace(backend, self.problem)
+        self._workspace = make_workspace(backend, qp)
 
     def solve(
         self,
         state: Vector,
         *,
         zmp: ZmpModel,
-        polygons: tuple[SupportPolygon, ...],
-        com_reference: Vector,
-        reach: Vector,
-        reach_distance: Vector,
-        delta_z_limit: float,
+        support: SupportPreview,
+        com_band: Vector,
         tasks: VelocityTasks,
         velocity_time: float,
         urgency: float,
@@ -119,26 +131,70 @@ class WholeBodyStage:
 
         Args:
             zmp: the ZMP's model over the horizon, known contact forces included (the paper's case a).
-            polygons: support polygon of each knot, N of them.
-            com_reference: (N, 2) weak position reference [m].
-            reach: (2, N, 2) hand references R [m]; nan rows are not bounded.
-            reach_distance: (2, 2) d per hand and axis [m].
-            delta_z_limit: bound on |ΔZ| per axis [m]: large to ask whether a contact is needed, 0 to execute.
+            support: support polygons and footsteps over the horizon, and where the CoM should be and go.
+            com_band: (2, N, 2) lowest and highest CoM per axis and knot [m]; ±inf where nothing binds.
             tasks: see `VelocityTasks`.
-            urgency: factor ≥ 1 on the costs of CoM velocity and position: how fast to come to rest.
             velocity_time: when the CoM velocity that q̇ should meet is taken [s after the state], < T.
+            urgency: factor ≥ 1 on the costs of CoM velocity and position: how fast to come to rest.
 
         Returns:
             The plan, or None when the solve failed (the solution carries the status).
         """
-        n, qp, preview, settings = self._preview.steps, self.problem, self._preview, self._settings
+        n, qp, preview = self._preview.steps, self.problem, self._preview
         P_zs, P_zu = preview.zmp_matrices(zmp.a, zmp.b)
         free = state @ preview.P_ps.T  # (2, N) positions without jerk
         free_velocity = state @ preview.P_vs.T
         free_zmp = P_zs @ state.T + zmp.offset  # (N, 2)
+        self._costs(state, free, free_velocity, support, tasks, velocity_time, urgency)
+        if support.centring.any():
+            self._centring(P_zu, free_zmp, support)
+        else:
+            m = self._steps
+            qp.hessian[m, : m.start] = qp.hessian[: m.start, m] = 0.0
+            qp.hessian[m, m] = self._settings.footstep_cost * np.eye(2 * MAX_FOOTSTEPS)
+            qp.gradient[m] = 0.0
+        self._support_rows(zmp, P_zu, free, free_velocity, free_zmp, support)
 
-        # cost of the jerks and of q̇, coupled by the CoM velocity at velocity_time
-        tau = velocity_time
+        gap = com_band - free[:, :, None]
+        qp.lower[self._band_rows], qp.upper[self._band_rows] = gap[:, :, 0].ravel(), gap[:, :, 1].ravel()
+        self._footsteps(support)
+        qp.matrix[self._foot_rows, self._qd] = tasks.foot_jacobian
+        qp.lower[self._foot_rows] = qp.upper[self._foot_rows] = tasks.foot_velocity
+        qp.x_lower[self._qd], qp.x_upper[self._qd] = tasks.lower, tasks.upper
+
+        solution = self._workspace.solve()
+        if solution.status != SolveStatus.SOLVED:
+            return None, solution
+        x = solution.x
+        jerk = x[self._u].reshape(2, n)
+        delta_z = (x[self._plus] - x[self._minus]).reshape(2, n).T if self._ask else np.zeros((n, 2))
+        steps = x[self._steps].reshape(2, MAX_FOOTSTEPS).T.copy()
+        return (
+            HorizontalPlan(
+                jerk=jerk.T.copy(),
+                com=(free + jerk @ preview.P_pu.T).T,
+                velocity=(free_velocity + jerk @ preview.P_vu.T).T,
+                acceleration=(state @ preview.P_as.T + jerk @ preview.P_au.T).T,
+                delta_z=delta_z,
+                zmp=free_zmp + P_zu @ jerk.T + delta_z,
+                footstep_shift=steps,
+                joint_velocity=x[self._qd].copy(),
+            ),
+            solution,
+        )
+
+    def _costs(
+        self,
+        state: Vector,
+        free: Vector,
+        free_velocity: Vector,
+        support: SupportPreview,
+        tasks: VelocityTasks,
+        tau: float,
+        urgency: float,
+    ) -> None:
+        """Cost of the jerks and of q̇, coupled by the CoM velocity at `tau` [s]."""
+        n, qp, preview, settings = self._preview.steps, self.problem, self._preview, self._settings
         gain = tau**2 / 2  # dċ(τ) / d(first jerk)
         J = tasks.com_jacobian
         H_qd = qp.hessian[self._qd, self._qd]
@@ -165,58 +221,75 @@ class WholeBodyStage:
             qp.hessian[first, self._qd] = cross
             qp.hessian[self._qd, first] = cross
             qp.gradient[block] = urgency * (
-                settings.velocity_cost * (preview.P_vu.T @ free_velocity[axis])
-                + settings.position_cost * (preview.P_pu.T @ (free[axis] - com_reference[:, axis]))
+                settings.velocity_cost * (preview.P_vu.T @ (free_velocity[axis] - support.com_velocity[:, axis]))
+                + settings.position_cost * (preview.P_pu.T @ (free[axis] - support.com_reference[:, axis]))
             )
             qp.gradient[first] += w_com * gain * wanted[axis]
 
-        # ZMP rows: edge-major within a knot
-        rows = qp.matrix[self._zmp_rows].reshape(n, MAX_EDGES, -1)
-        A = np.array([polygon.normals for polygon in polygons])  # (N, edges, 2)
-        offsets = np.array([polygon.offsets for polygon in polygons])
-        np.multiply(A[:, :, :1], P_zu[:, None, :], out=rows[:, :, :n])
-        np.multiply(A[:, :, 1:], P_zu[:, None, :], out=rows[:, :, n : 2 * n])
-        rows[self._knots, :, 2 * n + self._knots] = A[:, :, 0]
-        rows[self._knots, :, 3 * n + self._knots] = A[:, :, 1]
-        qp.upper[self._zmp_rows] = (offsets - np.einsum("kei,ki->ke", A, free_zmp)).ravel()
+    def _centring(self, P_zu: Vector, free_zmp: Vector, support: SupportPreview) -> None:
+        """Add  w_z Σ s_k |Z_k − S_k (F − F_ref) − centre_k|²  to the costs of jerks and footsteps."""
+        n, m, qp = self._preview.steps, MAX_FOOTSTEPS, self.problem
+        weight = self._settings.zmp_centre_cost * support.centring
+        weighted = P_zu.T * weight  # (N jerks, N knots)
+        own, cross = weighted @ P_zu, -weighted @ support.shift
+        steps = (support.shift.T * weight) @ support.shift + self._settings.footstep_cost * np.eye(m)
+        error = free_zmp - support.centres  # (N, 2)
+        for axis in range(2):
+            jerks = slice(axis * n, (axis + 1) * n)
+            footsteps = slice(self._steps.start + axis * m, self._steps.start + (axis + 1) * m)
+            qp.hessian[jerks, jerks] += own
+            qp.hessian[jerks, footsteps], qp.hessian[footsteps, jerks] = cross, cross.T
+            qp.hessian[footsteps, footsteps] = steps
+            qp.gradient[jerks] += weighted @ error[:, axis]
+            qp.gradient[footsteps] = -(support.shift.T * weight) @ error[:, axis]
 
-        # capture point of the last knot
+    def _support_rows(
+        self,
+        zmp: ZmpModel,
+        P_zu: Vector,
+        free: Vector,
+        free_velocity: Vector,
+        free_zmp: Vector,
+        support: SupportPreview,
+    ) -> None:
+        """ZMP rows, edge-major within a knot, and those of the last knot's capture point."""
+        n, m, qp, preview = self._preview.steps, MAX_FOOTSTEPS, self.problem, self._preview
+        rows = qp.matrix[self._zmp_rows].reshape(n, MAX_EDGES, -1)
+        A = support.normals  # (N, edges, 2)
+        steps, plus, minus = self._steps.start, self._plus.start, self._minus.start
+        for axis in range(2):
+            edges = A[:, :, axis]
+            np.multiply(edges[:, :, None], P_zu[:, None, :], out=rows[:, :, axis * n : (axis + 1) * n])
+            columns = slice(steps + axis * m, steps + (axis + 1) * m)
+            np.multiply(edges[:, :, None], -support.shift[:, None, :], out=rows[:, :, columns])
+            if self._ask:
+                rows[self._knots, :, plus + axis * n + self._knots] = edges
+                rows[self._knots, :, minus + axis * n + self._knots] = -edges
+        qp.upper[self._zmp_rows] = (support.offsets - np.einsum("kei,ki->ke", A, free_zmp)).ravel()
+
         tau_end = np.sqrt(zmp.b[-1] / zmp.a[-1])
         gain_end = zmp.a[-1] * (preview.P_pu[-1] + tau_end * preview.P_vu[-1])
-        rest = qp.matrix[self._rest_rows]
-        np.multiply(A[-1, :, :1], gain_end, out=rest[:, :n])
-        np.multiply(A[-1, :, 1:], gain_end, out=rest[:, n : 2 * n])
-        rest[:, 3 * n - 1], rest[:, 4 * n - 1] = A[-1, :, 0], A[-1, :, 1]
+        rest, A = qp.matrix[self._rest_rows], support.rest_normals
+        for axis in range(2):
+            edges = A[:, axis]
+            np.multiply(edges[:, None], gain_end, out=rest[:, axis * n : (axis + 1) * n])
+            columns = slice(steps + axis * m, steps + (axis + 1) * m)
+            np.multiply(edges[:, None], -support.rest_shift, out=rest[:, columns])
+            if self._ask:
+                rest[:, plus + (axis + 1) * n - 1], rest[:, minus + (axis + 1) * n - 1] = edges, -edges
         free_rest = zmp.a[-1] * (free[:, -1] + tau_end * free_velocity[:, -1]) + zmp.offset[-1]
-        qp.upper[self._rest_rows] = offsets[-1] - A[-1] @ free_rest
+        qp.upper[self._rest_rows] = support.rest_offsets - A @ free_rest
 
-        # reach rows: |R - C| <= d
-        gap = reach.transpose(0, 2, 1) - free  # (hand, axis, N)
-        bounded, distance = np.isfinite(gap), reach_distance[:, :, None]
-        qp.lower[self._reach_rows] = np.where(bounded, gap - distance, -np.inf).ravel()
-        qp.upper[self._reach_rows] = np.where(bounded, gap + distance, np.inf).ravel()
-
-        qp.matrix[self._foot_rows, self._qd] = tasks.foot_jacobian
-        qp.lower[self._foot_rows] = qp.upper[self._foot_rows] = tasks.foot_velocity
-        qp.x_lower[self._u], qp.x_upper[self._u] = -np.inf, np.inf
-        qp.x_lower[self._dz], qp.x_upper[self._dz] = -delta_z_limit, delta_z_limit
-        qp.x_lower[self._qd], qp.x_upper[self._qd] = tasks.lower, tasks.upper
-
-        solution = self._workspace.solve()
-        if solution.status != SolveStatus.SOLVED:
-            return None, solution
-        x = solution.x
-        jerk = x[self._u].reshape(2, n)
-        delta_z = x[self._dz].reshape(2, n).T.copy()
-        return (
-            HorizontalPlan(
-                jerk=jerk.T.copy(),
-                com=(free + jerk @ preview.P_pu.T).T,
-                velocity=(free_velocity + jerk @ preview.P_vu.T).T,
-                acceleration=(state @ preview.P_as.T + jerk @ preview.P_au.T).T,
-                delta_z=delta_z,
-                zmp=free_zmp + P_zu @ jerk.T + delta_z,
-                joint_velocity=x[self._qd].copy(),
-            ),
-            solution,
-        )
+    def _footsteps(self, support: SupportPreview) -> None:
+        """Where the coming footsteps may be: beside the one before, and within the swing foot's reach in time."""
+        m, qp = MAX_FOOTSTEPS, self.problem
+        rows = qp.matrix[self._step_rows].reshape(m, 2, -1)
+        for j in range(m):
+            for axis in range(2):
+                column = self._steps.start + axis * m + j
+                rows[j, :, column] = support.placement_axes[j, :, axis]
+                if j:
+                    rows[j, :, column - 1] = -support.placement_axes[j, :, axis]
+        qp.lower[self._step_rows] = support.placement_lower.ravel()
+        qp.upper[self._step_rows] = support.placement_upper.ravel()
+        qp.x_lower[self._steps], qp.x_upper[self._steps] = support.lower.T.ravel(), support.upper.T.ravel()

@@ -3,13 +3,26 @@
 from wbmpc.scenario.consistency import check_names
 from wbmpc.scenario.json_schema import scenario_json_schema
 from wbmpc.scenario.load import counterfactual, load_scenario, robot_path, vary
+from wbmpc.scenario.obstacles import Obstacle, resolve_obstacles
 from wbmpc.scenario.overrides import apply_overrides, parse_overrides
 from wbmpc.scenario.patches import PatchPose, resolve_patches
 from wbmpc.scenario.schema.experiments import Counterfactual, Sweep, Variation
 from wbmpc.scenario.schema.loop import InitialState, LoopSettings, RecordingSettings
 from wbmpc.scenario.schema.plant import Disturbance, Impulse, PlantSettings, SensorSettings
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import ComHeightTask, HeightWaypoint, ReachTask, StandTask, Task
+from wbmpc.scenario.schema.tasks import (
+    ComHeightTask,
+    ExcursionTask,
+    GoTask,
+    HeightWaypoint,
+    LeanTask,
+    ReachTask,
+    StandTask,
+    StepTask,
+    Task,
+    VelocityCommand,
+    WalkTask,
+)
 from wbmpc.scenario.schema.world import Box, Floor, Patch, World
 from wbmpc.scenario.world import build_world
 
@@ -18,11 +31,15 @@ __all__ = [
     "ComHeightTask",
     "Counterfactual",
     "Disturbance",
+    "ExcursionTask",
     "Floor",
+    "GoTask",
     "HeightWaypoint",
     "Impulse",
     "InitialState",
+    "LeanTask",
     "LoopSettings",
+    "Obstacle",
     "Patch",
     "PatchPose",
     "PlantSettings",
@@ -31,9 +48,12 @@ __all__ = [
     "Scenario",
     "SensorSettings",
     "StandTask",
+    "StepTask",
     "Sweep",
     "Task",
     "Variation",
+    "VelocityCommand",
+    "WalkTask",
     "World",
     "apply_overrides",
     "build_world",
@@ -41,6 +61,7 @@ __all__ = [
     "counterfactual",
     "load_scenario",
     "parse_overrides",
+    "resolve_obstacles",
     "resolve_patches",
     "robot_path",
     "scenario_json_schema",

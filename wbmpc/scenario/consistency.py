@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Iterator
 
-from wbmpc.checks.settings import ContactPatches, Reach, UniversalSettings
+from wbmpc.checks.settings import (
+    Arrived,
+    ContactPatches,
+    FootMoved,
+    Reach,
+    ScenarioCheck,
+    UniversalSettings,
+    WindowSettings,
+)
 from wbmpc.scenario.diagnosis import Finding
 from wbmpc.scenario.patches import FACES
 from wbmpc.scenario.robot_file import RobotNames
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import ComHeightTask, ReachTask, StandTask
+from wbmpc.scenario.schema.tasks import GoTask, ReachTask, StepTask, Task
+from wbmpc.scenario.task_consistency import find_task_inconsistencies
 from wbmpc.scenario.wording import KeyPath, describe, near_misses
 
 FLOOR = "floor"
@@ -19,7 +27,13 @@ FLOOR = "floor"
 
 def find_inconsistencies(scenario: Scenario) -> list[Finding]:
     """Every contradiction between the fields of one scenario; counterfactuals and sweep are looked at elsewhere."""
-    return [*_objects_and_patches(scenario), *_times(scenario), *_rates(scenario), *_checks(scenario)]
+    return [
+        *_objects_and_patches(scenario),
+        *_times(scenario),
+        *find_task_inconsistencies(scenario),
+        *_rates(scenario),
+        *_checks(scenario),
+    ]
 
 
 def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Finding]:
@@ -72,32 +86,10 @@ def _times(scenario: Scenario) -> Iterator[Finding]:
     if horizon > scenario.duration:
         message = f"the horizon of {horizon:g} s is longer than the run of {scenario.duration:g} s"
         yield Finding(("planner", "horizon_steps"), message)
-    for index, task in enumerate(scenario.tasks):
-        path: KeyPath = ("tasks", index)
-        if isinstance(task, StandTask):
-            continue
-        if isinstance(task, ReachTask) and task.arrive_by <= task.start:
-            message = f"must be later than start ({task.start:g} s), got {task.arrive_by:g} s"
-            yield Finding((*path, "arrive_by"), message)
-        elif isinstance(task, ComHeightTask):
-            yield from _waypoint_order(path, task)
-        if task.end > scenario.duration:
-            yield Finding(path, f"ends at {task.end:g} s, the run already at {scenario.duration:g} s (duration)")
-    heights = [index for index, task in enumerate(scenario.tasks) if isinstance(task, ComHeightTask)]
-    if len(heights) > 1:
-        yield Finding(("tasks", heights[1]), f"a second com_height task, first is tasks.{heights[0]}")
     for index, disturbance in enumerate(scenario.disturbances):
         if disturbance.end > scenario.duration:
             message = f"ends at {disturbance.end:g} s, the run already at {scenario.duration:g} s (duration)"
             yield Finding(("disturbances", index, "time"), message)
-
-
-def _waypoint_order(path: KeyPath, task: ComHeightTask) -> Iterator[Finding]:
-    times = [waypoint.time for waypoint in task.waypoints]
-    for index, (before, after) in enumerate(itertools.pairwise(times), start=1):
-        if after <= before:
-            message = f"must be later than the waypoint before it ({before:g} s), got {after:g} s"
-            yield Finding((*path, "waypoints", index, "time"), message)
 
 
 def _rates(scenario: Scenario) -> Iterator[Finding]:
@@ -126,17 +118,33 @@ def _rates(scenario: Scenario) -> Iterator[Finding]:
 def _checks(scenario: Scenario) -> Iterator[Finding]:
     names = check_names(scenario)
     universal = len(names) - len(scenario.checks)
-    has_reach = any(isinstance(task, ReachTask) for task in scenario.tasks)
     for index, check in enumerate(scenario.checks):
         path: KeyPath = ("checks", index)
         name = names[universal + index]
         if name in names[: universal + index]:
             key = "name" if check.name else "kind"
             yield Finding((*path, key), f"a second check called '{name}', give it a name of its own (key 'name')")
-        if isinstance(check, Reach) and check.target is None and not has_reach:
-            yield Finding((*path, "kind"), "needs a reach task or a target")
+        yield from _target(path, check, scenario.tasks)
+        if isinstance(check, WindowSettings) and check.window is not None and check.window[1] > scenario.duration:
+            message = f"ends at {check.window[1]:g} s, the run already at {scenario.duration:g} s (duration)"
+            yield Finding((*path, "window"), message)
         if isinstance(check, ContactPatches):
             for position, patch in enumerate(check.allowed or ()):
                 yield from _must_exist((*path, "allowed", position), patch, scenario.patches, "patch")
             if check.max_count is not None and check.max_count < check.min_count:
                 yield Finding((*path, "max_count"), f"less than min_count ({describe(check.min_count)})")
+
+
+def _target(path: KeyPath, check: ScenarioCheck, tasks: Iterable[Task]) -> Iterator[Finding]:
+    """A check without a target of its own takes that of a task, which must then be there."""
+    if isinstance(check, Reach):
+        what, has_target = "a reach task", any(isinstance(task, ReachTask) for task in tasks)
+    elif isinstance(check, Arrived):
+        what, has_target = "a go task", any(isinstance(task, GoTask) for task in tasks)
+    elif isinstance(check, FootMoved):
+        what = f"a step task of the {check.foot} foot"
+        has_target = any(isinstance(task, StepTask) and task.foot == check.foot for task in tasks)
+    else:
+        return
+    if check.target is None and not has_target:
+        yield Finding((*path, "kind"), f"needs {what} or a target")

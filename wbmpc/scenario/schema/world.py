@@ -27,6 +27,9 @@ class Box(StrictModel):
     bottom: NonNegative = Field(default=0.0, description="Height of the underside above the floor [m].")
     yaw: float = Field(default=0.0, description="Rotation about the world's z axis [rad].")
     friction: Friction = Field(default=0.8, description="Coulomb friction coefficient [-].")
+    walkable: bool = Field(
+        default=False, description="Whether the robot may stand on it: elsewhere a foot may touch the floor only."
+    )
     color: Colour = Field(default=(0.72, 0.53, 0.35, 1.0), description="Red, green, blue, opacity, each 0 to 1 [-].")
     present: bool = Field(
         default=True,

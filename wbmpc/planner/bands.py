@@ -1,0 +1,42 @@
+"""Where the CoM may be so that hands and feet reach: |R − C| ≤ d of every end-effector, as one band per axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.planner.settings import HeightSettings
+from wbmpc.signals import Vector
+
+
+def height_band(settings: HeightSettings, references: Vector, plane: float) -> Vector:
+    """Admissible band (N, 2) of the CoM height [m]: the legs' range, narrowed by |c_z − r_z| ≤ d of the hands.
+
+    Args:
+        references: (ends, N, 3) their references, nan for a free one ([M] eq. QP1).
+        plane: height of the feet [m].
+    """
+    z = references[:, :, 2]
+    low = np.fmax.reduce(z - settings.reach, axis=0)
+    high = np.fmin.reduce(z + settings.reach, axis=0)
+    low, high = np.fmax(low, plane + settings.lowest), np.fmin(high, plane + settings.highest)
+    return np.column_stack([low, high])
+
+
+def horizontal_band(references: Vector, distance: Vector) -> Vector:
+    """Admissible band (2, N, 2) of the horizontal CoM: axis, knot, lowest and highest [m]; ±inf where nothing binds.
+
+    Args:
+        references: (ends, N, 3) or (ends, N, 2) positions of the end-effectors [m], nan rows for free ones.
+        distance: (ends, 2) or (ends, N, 2) d of each, per axis [m].
+
+    Where two end-effectors disagree the band is the point between their bounds.
+    """
+    places = references[:, :, :2]
+    if distance.ndim == 2:
+        distance = distance[:, None, :]
+    low = np.fmax.reduce(places - distance, axis=0).T  # (2, N)
+    high = np.fmin.reduce(places + distance, axis=0).T
+    crossed = low > high
+    if crossed.any():
+        low[crossed] = high[crossed] = 0.5 * (low + high)[crossed]
+    return np.stack([np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)], axis=2)

@@ -1,0 +1,44 @@
+"""One footstep: which foot goes where, and how."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbmpc.signals import Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Footstep:
+    """A place for a foot, before stage 2 has moved it."""
+
+    side: int  # which foot goes
+    position: Vector  # (3,) [m] sole centre in world
+    yaw: float  # [rad]
+    swing_time: float  # [s]
+    double_support: float  # [s] before the foot is lifted, when it follows another step
+    clearance: float  # [m] how high the foot is lifted
+    lead: float  # share of the swing in which the foot only rises, and at its end only sinks: 0 … 0.4
+    adaptable: bool  # whether stage 2 may move it
+    task: int  # index of the task that asks for it
+
+    def share(self, sigma: Vector) -> Vector:
+        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time; minimum jerk between leads."""
+        phase = np.clip((sigma - self.lead) / (1.0 - 2.0 * self.lead), 0.0, 1.0)
+        return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
+
+
+@dataclass(frozen=True, slots=True)
+class Feet:
+    """Where both feet stand, or will stand; the steps are planned from this."""
+
+    positions: Vector  # (2, 3) [m] sole centres in world
+    yaws: Vector  # (2,) [rad]
+    last: int  # side of the foot that moved last; -1 when none has
+
+    def after(self, step: Footstep) -> Feet:
+        """The feet when `step` has been made."""
+        positions, yaws = self.positions.copy(), self.yaws.copy()
+        positions[step.side], yaws[step.side] = step.position, step.yaw
+        return Feet(positions, yaws, step.side)

@@ -1,0 +1,287 @@
+"""The gait: which feet stand, now and over the horizon."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from wbmpc.planner.footstep import Feet, Footstep
+from wbmpc.planner.settings import GaitSettings
+from wbmpc.planner.stepping import SIDE_SIGN, Stepping
+from wbmpc.planner.stride import Stride
+from wbmpc.planner.support import SupportPolygon, foot_corners
+from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
+from wbmpc.planner.swing import Swing
+from wbmpc.signals import SIDES, Vector
+
+EARLY = 0.6  # share of the swing from which a touch counts as the landing
+SEARCH_TIME = 0.6  # [s] after which a foot that finds no ground is taken for landed
+NEVER = 1e3  # [s]
+
+
+class SupportPhase(IntEnum):
+    """What carries the robot."""
+
+    STAND = 0  # both feet, no step ahead
+    DOUBLE = 1  # both feet, a step ahead
+    SINGLE = 2  # one foot, the other swings
+
+
+@dataclass(frozen=True, slots=True)
+class _Interval:
+    """One phase of the horizon: until `end` [s from now] the robot stands on `feet`."""
+
+    end: float
+    feet: Feet
+    swing: int  # side of the foot in the air, -1: none
+    moved: tuple[int, int]  # number of the footstep that each foot stands on; -1: it stands there already
+
+
+class Gait:
+    """Support phases of the two feet, driven by a clock, touch-downs and the steps that the tasks ask for."""
+
+    def __init__(self, settings: GaitSettings, stepping: Stepping, *, soles: Vector, yaws: Vector) -> None:
+        """Standing with the soles at `soles` (2, 3) [m], `yaws` (2,) [rad]."""
+        self._settings, self._stepping = settings, stepping
+        self.feet = Feet(soles.copy(), yaws.copy(), -1)
+        self.phase = SupportPhase.STAND
+        self.step: Footstep | None = None
+        self.swing: Swing | None = None
+        self._left = 0.0  # [s] until the phase ends
+        self._late = 0.0  # [s] since the foot should have landed
+
+    # ------------------------------------------------------------------ now
+
+    @property
+    def stance(self) -> tuple[bool, bool]:
+        """Which feet stand."""
+        return tuple(self.swing is None or self.swing.step.side != side for side in range(2))  # type: ignore[return-value]
+
+    def soles(self, rate: float) -> tuple[Vector, Vector, Vector, Vector]:
+        """Positions (2, 3) [m], yaws (2,) [rad], velocities and accelerations (2, 3) of both soles now."""
+        positions, yaws = self.feet.positions.copy(), self.feet.yaws.copy()
+        velocity, acceleration = np.zeros((2, 3)), np.zeros((2, 3))
+        if self.swing is not None:
+            side = self.swing.step.side
+            pace = rate / self.swing.step.swing_time if self._left > 0.0 else 0.0
+            positions[side], velocity[side], acceleration[side] = self.swing.reference(pace)
+            yaws[side] = self.swing.yaw
+        return positions, yaws, velocity, acceleration
+
+    @property
+    def stride(self) -> Stride | None:
+        """The step ahead or under way when its place is fixed: the CoM must go where it can be made."""
+        step = self.step if self.swing is None else self.swing.step
+        if self.phase == SupportPhase.STAND or step is None or step.adaptable:
+            return None
+        return Stride(step, self.feet, self.swing, self._left)
+
+    # ------------------------------------------------------------------ one plan later
+
+    def advance(
+        self, time: float, dt: float, *, rate: float, soles: Vector, yaws: Vector, loads: Vector, events: list[str]
+    ) -> None:
+        """Move the clock on by dt [s] at `rate` (0 … 1: the gate).
+
+        Args:
+            soles, yaws: measured (2, 3) [m], (2,) [rad]: a foot stands where it has landed.
+            loads: (2,) measured vertical forces [N].
+        """
+        settings = self._settings
+        if self.phase != SupportPhase.SINGLE:
+            wanted = self._stepping.next(self.feet, time)
+            if wanted is None:
+                self.phase, self.step = SupportPhase.STAND, None
+                return
+            if self.phase == SupportPhase.STAND:
+                self.phase, self._left = SupportPhase.DOUBLE, settings.first_double_support
+            self.step = wanted
+            self._left -= rate * dt
+            if self._left <= 1e-9:
+                self._lift(wanted, events)
+            return
+        assert self.swing is not None
+        swing = self.swing
+        side = swing.step.side
+        self._left = max(0.0, self._left - rate * dt)
+        swing.sigma = 1.0 - self._left / swing.step.swing_time
+        if self._left == 0.0:
+            self._late += dt
+            sunk = min(settings.search_speed * self._late, settings.search_depth)
+            swing.lower(sunk, settings.search_speed if sunk < settings.search_depth else 0.0)
+        landed = swing.sigma > EARLY and loads[side] > settings.landing_force
+        if landed or self._late > SEARCH_TIME:
+            self._land(soles[side], float(yaws[side]), time, events)
+
+    def aim(self, shift: Vector, dt: float) -> None:
+        """Move the landing place by what stage 2 has decided, `shift` (2,) [m] from the step's own place."""
+        if self.swing is not None and self.swing.step.adaptable:
+            self.swing.move_target(self.swing.step.position[:2] + shift, dt)
+
+    def _lift(self, step: Footstep, events: list[str]) -> None:
+        side = step.side
+        self.swing = Swing(
+            step,
+            start=self.feet.positions[side],
+            yaw=float(self.feet.yaws[side]),
+            speed=self._settings.foot_speed,
+        )
+        self.phase, self._left, self._late = SupportPhase.SINGLE, step.swing_time, 0.0
+        events.append(f"foot {SIDES[side]}: lifted")
+
+    def _land(self, sole: Vector, yaw: float, time: float, events: list[str]) -> None:
+        assert self.swing is not None
+        step = self.swing.step
+        positions, yaws = self.feet.positions.copy(), self.feet.yaws.copy()
+        positions[step.side], yaws[step.side] = sole, yaw
+        self.feet = Feet(positions, yaws, step.side)
+        self.swing = None
+        self._stepping.landed(step)
+        self.step = self._stepping.next(self.feet, time)
+        self.phase = SupportPhase.DOUBLE if self.step else SupportPhase.STAND
+        self._left = self.step.double_support if self.step else 0.0
+        x, y = sole[:2]
+        events.append(f"foot {SIDES[step.side]}: landed at ({x:.3f}, {y:.3f})")
+
+    # ------------------------------------------------------------------ over the horizon
+
+    def preview(
+        self, time: float, times: Vector, *, rate: float, margin: float, growth: float, half_extents: Vector
+    ) -> SupportPreview:
+        """Support over the horizon.
+
+        Args:
+            time: now [s].
+            times: (N,) knots [s from now].
+            rate: at which the present phase goes on (0 … 1).
+            margin: inset of the polygons [m], growing by `growth` [m/s].
+            half_extents: (2,) of a sole [m].
+        """
+        intervals, steps = self._intervals(time, float(times[-1]), rate)
+        n, m = len(times), MAX_FOOTSTEPS
+        shift, rest_shift = np.zeros((n, m)), np.zeros(m)
+        com_reference, com_velocity = np.empty((n, 2)), np.empty((n, 2))
+        polygons: list[SupportPolygon] = []
+        centring = np.zeros(n)
+        made: dict[int, SupportPolygon] = {}
+        which = 0
+        for k, t in enumerate(times):
+            while which < len(intervals) - 1 and t > intervals[which].end + 1e-9:
+                which += 1
+            interval = intervals[which]
+            if which not in made:
+                made[which] = _polygon(interval, half_extents, margin)
+            polygons.append(made[which].shrunk(growth * t))
+            _share(interval, shift[k])
+            centring[k] = float(interval.swing >= 0)
+            com_reference[k] = interval.feet.positions[:, :2].mean(axis=0)
+            com_velocity[k] = self._stepping.velocity(interval.feet, time + t)
+        last = intervals[which]
+        both = last if last.swing < 0 else intervals[min(which + 1, len(intervals) - 1)]
+        rest = _polygon(_Interval(0.0, both.feet, -1, both.moved), half_extents, margin + growth * float(times[-1]))
+        _share(_Interval(0.0, both.feet, -1, both.moved), rest_shift)
+        lower, upper, axes, placement_lower, placement_upper, places = self._bounds(steps)
+        return SupportPreview(
+            normals=np.array([p.normals for p in polygons]),
+            offsets=np.array([p.offsets for p in polygons]),
+            shift=shift,
+            polygons=tuple(polygons),
+            centres=np.array([p.centre for p in polygons]),
+            centring=centring,
+            rest_normals=rest.normals,
+            rest_offsets=rest.offsets,
+            rest_shift=rest_shift,
+            footsteps=places,
+            placement_axes=axes,
+            placement_lower=placement_lower,
+            placement_upper=placement_upper,
+            lower=lower,
+            upper=upper,
+            com_reference=com_reference,
+            com_velocity=com_velocity,
+        )
+
+    def goal_polygon(self, *, half_extents: Vector, margin: float) -> SupportPolygon:
+        """What carries the robot where its task ends: the stance foot when a foot is put somewhere, else both feet."""
+        stride = self.stride
+        swing = -1 if stride is None else stride.step.side
+        return _polygon(_Interval(NEVER, self.feet, swing, (-1, -1)), half_extents, margin)
+
+    def _intervals(self, time: float, horizon: float, rate: float) -> tuple[list[_Interval], list[Footstep]]:
+        """Phases until the horizon [s] and the footsteps made in them, at most MAX_FOOTSTEPS."""
+        feet, moved = self.feet, (-1, -1)
+        steps: list[Footstep] = []
+        made: tuple[int, ...] = ()
+        if self.phase == SupportPhase.STAND or (self.step is None and self.swing is None):
+            return [_Interval(NEVER, feet, -1, moved)], steps
+        end = min(self._left / max(rate, 1e-6), NEVER)
+        intervals: list[_Interval] = []
+        step = self.step if self.swing is None else self.swing.step
+        if self.swing is None:
+            intervals.append(_Interval(end, feet, -1, moved))
+            assert step is not None
+            end += step.swing_time
+        while step is not None and len(steps) < MAX_FOOTSTEPS:
+            intervals.append(_Interval(end, feet, step.side, moved))
+            moved = (len(steps), moved[1]) if step.side == 0 else (moved[0], len(steps))
+            steps.append(step)
+            made += (step.task,)
+            feet = feet.after(step)
+            if end > horizon:
+                break
+            step = self._stepping.next(feet, time + end, made=made)
+            end = end + step.double_support if step else NEVER
+            intervals.append(_Interval(end, feet, -1, moved))
+            if step is not None:
+                end += step.swing_time
+        intervals.append(_Interval(NEVER, feet, -1, moved))
+        return intervals, steps
+
+    def _bounds(self, steps: list[Footstep]) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
+        """Where stage 2 may move the footsteps: each beside the foot that stands, the present one within reach."""
+        settings, m = self._settings, MAX_FOOTSTEPS
+        lower, upper, places = np.zeros((m, 2)), np.zeros((m, 2)), np.zeros((m, 2))
+        axes = np.tile(np.eye(2), (m, 1, 1))
+        placement_lower, placement_upper = np.full((m, 2), -np.inf), np.full((m, 2), np.inf)
+        feet = self.feet
+        for j, step in enumerate(steps):
+            places[j] = step.position[:2]
+            stance = 1 - step.side
+            c, s = np.cos(feet.yaws[stance]), np.sin(feet.yaws[stance])
+            axes[j] = [[c, s], [-s, c]]
+            nominal = axes[j] @ (step.position - feet.positions[stance])[:2]
+            if step.adaptable:
+                widths = sorted((SIDE_SIGN[step.side] * settings.narrowest, SIDE_SIGN[step.side] * settings.widest))
+                low, high = np.array([-settings.longest, widths[0]]), np.array([settings.longest, widths[1]])
+                placement_lower[j] = np.minimum(low, nominal) - nominal
+                placement_upper[j] = np.maximum(high, nominal) - nominal
+                lower[j], upper[j] = -0.3, 0.3
+            feet = feet.after(step)
+        if self.swing is not None and self.swing.step.adaptable:
+            reach = settings.foot_speed * self._left
+            offset = self.swing.target[:2] - self.swing.step.position[:2]
+            lower[0], upper[0] = offset - reach, offset + reach
+        return lower, upper, axes, placement_lower, placement_upper, places
+
+
+def _polygon(interval: _Interval, half_extents: Vector, margin: float) -> SupportPolygon:
+    feet = interval.feet
+    standing = [side for side in range(2) if side != interval.swing]
+    corners = np.vstack(
+        [
+            foot_corners(position=feet.positions[side], yaw=float(feet.yaws[side]), half_extents=half_extents)
+            for side in standing
+        ]
+    )
+    plane = float(feet.positions[standing, 2].mean())
+    return SupportPolygon.of_corners(corners, margin=margin, plane_height=plane)
+
+
+def _share(interval: _Interval, shift: Vector) -> None:
+    """Write the share of each footstep's displacement by which the interval's polygon moves into `shift`."""
+    standing = [side for side in range(2) if side != interval.swing]
+    for side in standing:
+        if interval.moved[side] >= 0:
+            shift[interval.moved[side]] += 1.0 / len(standing)
