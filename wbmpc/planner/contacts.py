@@ -51,6 +51,7 @@ class Contacts:
         self._hopeless = 0.0  # [s] that no candidate has been able to help
         self._since_review = RETRY_PLANS
         self._palm_velocities = np.zeros((len(SIDES), 3))  # [m/s] measured at the last plan
+        self._urgency = 0.0  # 0 … 1, at the last plan
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -114,7 +115,7 @@ class Contacts:
 
         `urgency` 0 … 1 is the alarm that a push has sounded.
         """
-        self._palm_velocities = palm_velocities
+        self._palm_velocities, self._urgency = palm_velocities, urgency
         for contact in self.hands:
             side, before, patch = contact.side, contact.phase, self.name(contact.side)
             outcome = contact.advance(
@@ -226,7 +227,7 @@ class Contacts:
         """Stage 3's choice of what joins the committed contacts."""
         held = _options(self._committed)
         winners, reports, stage = self.candidates.choose(
-            knots, palms=palms, free_hands=free, held=held, polygon=polygon
+            knots, palms=palms, free_hands=free, held=held, polygon=polygon, urgency=self._urgency
         )
         chosen = " and ".join(f"{w.patch.name} for the {SIDES[w.hand]} hand" for w in winners)
         size = 1e3 * np.abs(knots.delta_z[0]).max()

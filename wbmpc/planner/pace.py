@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from wbmpc.planner.settings import ContactSettings
 
 ARRIVED, ROUGHLY_ARRIVED = 0.012, 0.05  # [m] palm error at the clearance point below which the descent begins
+
+
+def hurried(urgency: float) -> bool:
+    """Whether hands go straight to their surface, as fast as the arm can."""
+    return urgency > 0.5
+
+
+def way_time(settings: ContactSettings, distance: float) -> float:
+    """Time [s] that such a hand needs for `distance` [m], from rest to rest with the acceleration it may have."""
+    return math.sqrt(6.0 * distance / settings.urgent_acceleration)
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +33,7 @@ class Pace:
     @property
     def hurried(self) -> bool:
         """Whether the palm goes straight to the surface, as fast as this."""
-        return self.urgency > 0.5
+        return hurried(self.urgency)
 
     @classmethod
     def of(cls, settings: ContactSettings, urgency: float) -> Pace:
