@@ -38,6 +38,7 @@ class Plan:
     hand_position: Vector  # (2, 3) [m]
     hand_velocity: Vector  # (2, 3) [m/s]
     hand_acceleration: Vector  # (2, 3) [m/s²]
+    hand_urgency: Vector  # (2,) 0 … 1
     hand_force: Vector  # (2, 3) [N]
     hand_force_cap: Vector  # (2,) [N] at the snapshot
     hand_force_cap_rate: Vector  # (2,) [N/s]
@@ -88,6 +89,7 @@ class Plan:
             hand_position=self.hand_position + dt * self.hand_velocity + dt**2 / 2 * self.hand_acceleration,
             hand_velocity=going * (self.hand_velocity + dt * self.hand_acceleration),
             hand_acceleration=going * self.hand_acceleration,
+            hand_urgency=self.hand_urgency,
             hand_force=self.hand_force,
             hand_force_cap=np.minimum(
                 np.maximum(self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0), self.hand_force_cap_top

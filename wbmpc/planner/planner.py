@@ -91,7 +91,7 @@ class Planner:
         settings, preview, contacts, references = self._settings, self._preview, self._contacts, self._references
         self._observe(state)
         self._advance(state, events)
-        at_once, gated_support = self._supports(state.time)
+        judged, gated_support = self._supports(state.time)
         polygon = gated_support.polygons[0]
         plane = polygon.plane_height
         mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
@@ -125,10 +125,10 @@ class Planner:
         urgency = 1.0 + alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, com_band: Vector
+            stage: WholeBodyStage, com: Vector, zmp: ZmpModel, support: SupportPreview, com_band: Vector
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
-                self._com.value[:2],
+                com[:2],
                 zmp=zmp,
                 support=support,
                 com_band=com_band,
@@ -142,27 +142,25 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(
-                self._need_stage, model, at_once, references.com_band(contacts, full_pace, full_sigma, foot)
-            )
+            full_band = references.com_band(contacts, full_pace, full_sigma, foot)
+            wish, _ = stage_2(self._need_stage, self._com.anticipated, model, judged, full_band)
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
-                    need_of(wish, height, model, polygons=at_once.polygons, mass=mass, exact=exact),
+                    need_of(wish, height, model, polygons=judged.polygons, mass=mass, exact=exact),
                     goal=self._goal_need(mass),
                     binding=stride is not None,
                     palms=self._measured.palms,
                     hand_taken=references.hands_taken(),
-                    polygon=polygon,
+                    polygon=judged.polygons[0],
                     spent=references.spent(contacts),
                     events=events,
                 )
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(
-            self._motion_stage, model, gated_support, references.com_band(contacts, gated, sigma, gated_foot)
-        )
+        com_band = references.com_band(contacts, gated, sigma, gated_foot)
+        motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
         stage2 = _stage_report(solution, begin)
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
@@ -226,8 +224,10 @@ class Planner:
         contacts.advance(
             dt,
             palms=self._measured.palms,
+            palm_velocities=self._measured.palm_velocities,
             palm_forces=state.palm_force_in_world,
             homes=self._measured.palm_homes,
+            urgency=self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0,
             events=events,
         )
         asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
@@ -261,11 +261,14 @@ class Planner:
         return need_at_rest(com, polygon=polygon, mass=mass)
 
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
-        """Support at full pace and at the gate's, its inset smaller the louder the alarm."""
-        settings = self._settings.whole_body
-        margin = settings.zmp_margin + self._com.alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+        """Support to judge the need for a contact by, at full pace, and to move in, at the gate's.
 
-        def preview(rate: float) -> SupportPreview:
+        The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
+        """
+        settings, alarm = self._settings.whole_body, self._com.alarm
+        margin = settings.zmp_margin + alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+
+        def preview(rate: float, margin: float) -> SupportPreview:
             return self._gait.preview(
                 time,
                 self._preview.times,
@@ -275,8 +278,8 @@ class Planner:
                 half_extents=self._robot.sole_half_extents,
             )
 
-        at_once = preview(1.0)
-        return at_once, at_once if self._gate >= 1.0 else preview(self._gate)
+        judged = preview(1.0, settings.zmp_margin)
+        return judged, judged if self._gate >= 1.0 and alarm == 0.0 else preview(self._gate, margin)
 
     def _make_plan(
         self,
@@ -292,6 +295,11 @@ class Planner:
         velocity = motion.joint_velocity if motion is not None else np.zeros(self._robot.nv)
         states, jerk = com_course(self._com.value, motion, height)
         palm_position, palm_velocity = self._joints.palms(velocity)
+        palm_acceleration = np.zeros((len(SIDES), 3))
+        for contact in contacts:
+            if contact.hurried:  # straight from its path: stage 2's joint reference would come too late
+                side = contact.side
+                palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
         caps = np.array([c.caps(np.array([0.0, self._period])) for c in contacts])  # now and one plan later
         zero = np.zeros((len(SIDES), 3))
         return Plan(
@@ -312,7 +320,8 @@ class Planner:
             hand_mode=np.array([int(mode) for _, _, mode in hands]),
             hand_position=palm_position,
             hand_velocity=palm_velocity,
-            hand_acceleration=zero,
+            hand_acceleration=palm_acceleration,
+            hand_urgency=np.array([float(c.hurried) for c in contacts]),
             hand_force=report.contact_force[:, 0],
             hand_force_cap=caps[:, 0],
             hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / self._period,
