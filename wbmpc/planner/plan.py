@@ -45,6 +45,7 @@ class Plan:
     hand_force_cap_top: Vector  # (2,) [N]
     hand_normal: Vector  # (2, 3)
     hand_friction: Vector  # (2,)
+    arm_keep_out: Vector  # (2, 3, 4)
     report: PlanReport
 
     def com_state(self, time: float) -> Vector:
@@ -96,6 +97,7 @@ class Plan:
             ),
             hand_normal=self.hand_normal,
             hand_friction=self.hand_friction,
+            arm_keep_out=self.arm_keep_out,
         )
 
 

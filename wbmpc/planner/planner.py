@@ -16,6 +16,7 @@ from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet, SoleReferences
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
+from wbmpc.planner.keep_out import keep_out
 from wbmpc.planner.plan import Plan, com_course
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.references import References
@@ -58,7 +59,7 @@ class Planner:
         period: float,
     ) -> None:
         """Start from rest at configuration `q` (nq,); `period` is the time between two plans [s]."""
-        self._robot, self._settings, self._period = robot, settings, period
+        self._robot, self._settings, self._period, self._obstacles = robot, settings, period, obstacles
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
         self._need_stage, self._motion_stage = (
@@ -301,7 +302,8 @@ class Planner:
                 side = contact.side
                 palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
         caps = np.array([c.caps(np.array([0.0, self._period])) for c in contacts])  # now and one plan later
-        zero = np.zeros((len(SIDES), 3))
+        arms = keep_out(self._measured.arm_points.reshape(-1, 3), self._obstacles).reshape(len(SIDES), -1, 4)
+        arms[[mode != HandMode.FREE for _, _, mode in hands], :, 3] = -np.inf  # a hand with a task finds its own way
         return Plan(
             time=report.time,
             step=self._preview.step,
@@ -328,6 +330,7 @@ class Planner:
             hand_force_cap_top=np.array([c.patch.force_cap if c.patch else 0.0 for c in contacts]),
             hand_normal=np.array([c.patch.normal if c.patch else [0.0, 0.0, 1.0] for c in contacts]),
             hand_friction=np.array([c.patch.friction if c.patch else 0.5 for c in contacts]),
+            arm_keep_out=arms,
             report=report,
         )
 

@@ -34,6 +34,8 @@ class Snapshot:
         kinematics, robot = self._kinematics, self._robot
         self.com, self.com_velocity = kinematics.com, kinematics.com_velocity  # (3,) [m], [m/s]
         self.palms = np.array([kinematics.position(f) for f in robot.palm_frames])  # (2, 3) [m]
+        elbows = np.array([kinematics.position(f) for f in robot.elbow_frames])
+        self.arm_points = np.stack([self.palms, 0.5 * (self.palms + elbows), elbows], axis=1)  # (2, 3, 3) [m]
         self.palm_velocities = np.array([kinematics.velocity(f)[:3] for f in robot.palm_frames])  # (2, 3) [m/s]
         self.soles = np.array([kinematics.position(f) for f in robot.sole_frames])  # (2, 3) [m]
         self.sole_yaws = np.array([heading_of(kinematics.rotation(f)) for f in robot.sole_frames])  # (2,) [rad]
