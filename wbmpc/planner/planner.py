@@ -7,16 +7,17 @@ from time import perf_counter
 
 import numpy as np
 
+from wbmpc.planner.assembly import assemble
 from wbmpc.planner.bands import height_band
-from wbmpc.planner.com_height import ComHeightStage, HeightPlan
+from wbmpc.planner.com_height import ComHeightStage
 from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.footholds import Footholds
-from wbmpc.planner.footstep import Feet, SoleReferences
+from wbmpc.planner.footstep import Feet
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
-from wbmpc.planner.keep_out import keep_out
+from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.plan import Plan, com_course
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.references import References
@@ -29,7 +30,7 @@ from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.scenario import Obstacle, PatchPose, Task
-from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
+from wbmpc.signals import SIDES, CandidateReport, PlanReport, RobotState, StageReport, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
@@ -59,7 +60,7 @@ class Planner:
         period: float,
     ) -> None:
         """Start from rest at configuration `q` (nq,); `period` is the time between two plans [s]."""
-        self._robot, self._settings, self._period, self._obstacles = robot, settings, period, obstacles
+        self._robot, self._settings, self._period, self._keep_out = robot, settings, period, KeepOut(obstacles)
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
         self._need_stage, self._motion_stage = (
@@ -186,7 +187,23 @@ class Planner:
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
-        self._last = self._make_plan(motion, height, hands, soles, report)
+        if motion is None and self._last is not None:
+            self._last = replace(self._last, report=report)
+            return self._last
+        arms = self._keep_out.half_spaces(self._measured.arm_points.reshape(-1, 3)).reshape(len(SIDES), -1, 4)
+        self._last = assemble(
+            report,
+            step=preview.step,
+            period=self._period,
+            course=com_course(self._com.value, motion, height),
+            velocity=motion.joint_velocity if motion is not None else np.zeros(self._robot.nv),
+            joints=self._joints,
+            stance=self._gait.stance,
+            soles=soles,
+            modes=[mode for _, _, mode in hands],
+            contacts=contacts.hands,
+            arm_keep_out=arms,
+        )
         return self._last
 
     # ------------------------------------------------------------------ steps of one plan
@@ -281,58 +298,6 @@ class Planner:
 
         judged = preview(1.0, settings.zmp_margin)
         return judged, judged if self._gate >= 1.0 and alarm == 0.0 else preview(self._gate, margin)
-
-    def _make_plan(
-        self,
-        motion: HorizontalPlan | None,
-        height: HeightPlan,
-        hands: list[tuple[Vector, Vector, HandMode]],
-        soles: SoleReferences,
-        report: PlanReport,
-    ) -> Plan:
-        if motion is None and self._last is not None:
-            return replace(self._last, report=report)
-        contacts = self._contacts.hands
-        velocity = motion.joint_velocity if motion is not None else np.zeros(self._robot.nv)
-        states, jerk = com_course(self._com.value, motion, height)
-        palm_position, palm_velocity = self._joints.palms(velocity)
-        palm_acceleration = np.zeros((len(SIDES), 3))
-        for contact in contacts:
-            if contact.hurried:  # straight from its path: stage 2's joint reference would come too late
-                side = contact.side
-                palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
-        caps = np.array([c.caps(np.array([0.0, self._period])) for c in contacts])  # now and one plan later
-        arms = keep_out(self._measured.arm_points.reshape(-1, 3), self._obstacles).reshape(len(SIDES), -1, 4)
-        arms[[mode != HandMode.FREE for _, _, mode in hands], :, 3] = -np.inf  # a hand with a task finds its own way
-        return Plan(
-            time=report.time,
-            step=self._preview.step,
-            com_states=states,
-            com_jerk=jerk,
-            q=self._joints.q,
-            velocity=velocity,
-            torso_rotation=self._joints.torso_rotation,
-            torso_angular_velocity=self._joints.torso_velocity(velocity),
-            foot_stance=np.array(self._gait.stance),
-            foot_position=soles.positions,
-            foot_yaw=soles.yaws,
-            foot_yaw_rate=soles.yaw_rates,
-            foot_velocity=soles.velocities,
-            foot_acceleration=soles.accelerations,
-            hand_mode=np.array([int(mode) for _, _, mode in hands]),
-            hand_position=palm_position,
-            hand_velocity=palm_velocity,
-            hand_acceleration=palm_acceleration,
-            hand_urgency=np.array([float(c.hurried) for c in contacts]),
-            hand_force=report.contact_force[:, 0],
-            hand_force_cap=caps[:, 0],
-            hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / self._period,
-            hand_force_cap_top=np.array([c.patch.force_cap if c.patch else 0.0 for c in contacts]),
-            hand_normal=np.array([c.patch.normal if c.patch else [0.0, 0.0, 1.0] for c in contacts]),
-            hand_friction=np.array([c.patch.friction if c.patch else 0.5 for c in contacts]),
-            arm_keep_out=arms,
-            report=report,
-        )
 
 
 def _stage_report(solution: QpSolution, start: float) -> StageReport:
