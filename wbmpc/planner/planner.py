@@ -81,10 +81,7 @@ class Planner:
         self._joints = JointReference(robot, settings.whole_body, q=q)
         self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
-        self._time, self._elapsed = (
-            0.0,
-            period,
-        )  # [s] of the last snapshot, and since it: longer when a plan was skipped
+        self._time, self._elapsed = 0.0, period  # [s] of the last snapshot, since it: longer after a skipped plan
 
     def solve(self, state: RobotState) -> Plan:
         """Plan from a snapshot. A failed solve keeps the last plan (or stands still) and says so in the report."""
