@@ -51,6 +51,8 @@ class Contacts:
         self._spent: tuple[int, ...] = ()  # sides of contacts out of reach of what comes next
         self._hopeless = 0.0  # [s] that no candidate has been able to help
         self._since_review = RETRY_PLANS
+        self._palm_velocities = np.zeros((len(SIDES), 3))  # [m/s] measured at the last plan
+        self._urgency = 0.0  # 0 … 1, at the last plan
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -104,17 +106,33 @@ class Contacts:
         if all(palm is not None for palm in palms):
             self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
-    def advance(self, dt: float, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
-        """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N]."""
+    def advance(
+        self,
+        dt: float,
+        *,
+        palms: Vector,
+        palm_velocities: Vector,
+        palm_forces: Vector,
+        homes: Vector,
+        urgency: float,
+        events: list[str],
+    ) -> None:
+        """Every contact's life one plan further, with measured palms (2, 3) [m, m/s] and forces (2, 3) [N].
+
+        `urgency` 0 … 1 is the alarm that a push has sounded.
+        """
+        self._palm_velocities, self._urgency = palm_velocities, urgency
         for contact in self.hands:
             side, before, patch = contact.side, contact.phase, self.name(contact.side)
             outcome = contact.advance(
                 dt,
                 palm=palms[side],
+                palm_velocity=palm_velocities[side],
                 force=palm_forces[side],
                 wanted_force=float(self.forces[side, 0] @ contact.patch.normal) if contact.patch else 0.0,
                 needed=self._needed and side != self._spare and side not in self._spent,
                 quiet=self._quiet or side == self._spare or side in self._spent,
+                urgency=urgency,
                 home=homes[side],
             )
             if outcome == "failed":
@@ -218,7 +236,7 @@ class Contacts:
         """Stage 3's choice of what joins the committed contacts."""
         held = _options(self._committed)
         winners, reports, stage = self.candidates.choose(
-            knots, palms=palms, free_hands=free, held=held, polygon=polygon
+            knots, palms=palms, free_hands=free, held=held, polygon=polygon, urgency=self._urgency
         )
         chosen = " and ".join(f"{w.patch.name} for the {SIDES[w.hand]} hand" for w in winners)
         size = 1e3 * np.abs(knots.delta_z[0]).max()
@@ -227,7 +245,9 @@ class Contacts:
             f"stage 3 fired: |ΔZ| {size:.1f} mm{beside}, {f'chose {chosen}' if chosen else 'no candidate helps'}"
         )
         for winner in winners:
-            self.hands[winner.hand].choose(winner.patch, palm=palms[winner.hand])
+            self.hands[winner.hand].choose(
+                winner.patch, palm=palms[winner.hand], palm_velocity=self._palm_velocities[winner.hand]
+            )
             self._hopeless, self._short = 0.0, False
         return reports, stage
 
