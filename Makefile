@@ -11,7 +11,7 @@ TEST_ARGS ?=
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test lint format types scenarios bench lock setup clean
+.PHONY: run test lint format types scenarios pictures bench lock setup clean
 .DELETE_ON_ERROR:
 
 run: setup
@@ -33,6 +33,12 @@ types: setup
 
 scenarios: setup
 	$(BIN)/wbmpc run scenarios/*.yaml --counterfactuals --out $(OUT)
+
+# docs/scenarios.md anew, pictures and all.
+pictures: setup
+	$(BIN)/wbmpc run scenarios/*.yaml --out $(OUT)
+	$(BIN)/wbmpc plot $(patsubst scenarios/%.yaml,$(OUT)/%.rrd,$(wildcard scenarios/*.yaml)) --out docs/pictures
+	$(BIN)/python docs/scenarios_page.py
 
 bench: setup
 	$(BIN)/python -m benchmarks

@@ -41,6 +41,7 @@ ALLOWED = {
     "footage": RECORDS | {"footage"},
     "render": RECORDS | {"footage", "render"},
     "rerun_sink": RECORDS | {"footage", "rerun_sink"},
+    "figures": RECORDS | {"checks", "footage", "render", "rerun_sink", "figures"},
     "checks": RECORDS | ROBOT | {"settings", "checks"},
     "mailbox": BASE | {"planner", "mailbox"},
     "loop": LOOP,
@@ -53,9 +54,10 @@ ALLOWED = {
     "counterfactuals": SETTINGS | {"verdict", "counterfactuals"},
     "session": LOOP | {"checks", "facts", "metrics", "verdict", "versions", "rerun_sink", "realtime", "session"},
     "sweep_journal": BASE | {"sweep_journal"},
-    "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "sweep"},
+    "pool": {"pool"},
+    "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "pool", "sweep"},
     "commands": None,  # anything
-    "cli": {"commands", "scenario", "versions", "cli"},
+    "cli": {"commands", "scenario", "versions", "pool", "cli"},
     "__main__": {"cli", "__main__"},
 }
 

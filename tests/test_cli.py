@@ -19,7 +19,7 @@ import wbmpc.session
 from wbmpc.checks.result import CheckResult
 from wbmpc.cli import app
 from wbmpc.commands.exits import ExitCode, guarded
-from wbmpc.commands.run import dump_last_states
+from wbmpc.commands.one_run import dump_last_states
 from wbmpc.counterfactuals import objection
 from wbmpc.errors import WbmpcError
 from wbmpc.scenario import Counterfactual
@@ -48,7 +48,7 @@ def verdict(name: str, checks: list[CheckResult], seed: int = 0) -> Verdict:
         scenario=name,
         seed=seed,
         checks=checks,
-        metrics={"com_height_min": 0.2, "first_hand_contact": float("nan")},
+        metrics={"com_height_min": 0.2, "first_hand_contact": float("nan"), "simulated_time": 2.0},
         solver={"tracker": {"solves": 10, "failures": 0, "p50": 1e-4, "p99": 2e-4, "max": 3e-4}},
         real_time_factor=1.5,
         missed_deadlines=0,
@@ -70,7 +70,8 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     def run_scenario(scenario: Any, *, name: str, recording: Path | None, realtime: bool, on_progress: Any) -> Any:
         ran.append(SimpleNamespace(scenario=scenario, name=name, recording=recording, realtime=realtime))
-        on_progress(scenario.duration)
+        if on_progress is not None:
+            on_progress(scenario.duration)
         weak = scenario.plant.mass_scale == 2.0
         checks = [check("upright_at_end"), check("torque_peak", passed=not weak, value=2.0 if weak else 0.5)]
         return SimpleNamespace(verdict=verdict(name, checks, scenario.seed), recorder=recorder_of(1.0), wall_time=0.1)
@@ -138,15 +139,18 @@ def test_options_reach_the_run(call: Any, fake: list[Any], scenario: Path, tmp_p
 def test_counterfactuals_pass_when_they_end_as_declared(
     call: Any, fake: list[Any], scenario: Path, tmp_path: Path
 ) -> None:
-    result = call("run", scenario, "--out", tmp_path, "--counterfactuals")
+    result = call("run", scenario, "--out", tmp_path, "--counterfactuals", "--jobs", 1)
     assert result.exit_code == 0, result.output
     assert [run.name for run in fake] == ["calm", "calm.weak", "calm.same"]
-    lines = result.output.splitlines()[-3:]
-    assert lines == [
-        "PASS calm",
-        "PASS calm.weak: fails torque_peak, as declared",
-        "PASS calm.same: passes, as declared",
+    assert [line for line in result.output.splitlines() if line.startswith("runs: ")] == [
+        "runs: 1/3 PASS calm",
+        "runs: 2/3 PASS calm.weak: fails torque_peak, as declared",
+        "runs: 3/3 PASS calm.same: passes, as declared",
     ]
+    rows = [" ".join(line.split()) for line in result.output.splitlines()]
+    assert "calm pass PASS upright_at_end 0.5 m, torque_peak 0.5 m 2.0 0.1" in rows
+    assert "weak fail: torque_peak PASS fails torque_peak 2 m 2.0 0.1" in rows
+    assert rows[-1] == "PASS: all 3 runs ended as declared"
     assert json.loads((tmp_path / "calm.weak.json").read_text())["passed"] is False
     suites = ElementTree.parse(tmp_path / "junit.xml").getroot()
     assert [suite.get("name") for suite in suites] == ["calm", "calm.weak", "calm.same"]
@@ -157,9 +161,12 @@ def test_counterfactuals_pass_when_they_end_as_declared(
 def test_a_counterfactual_that_ends_otherwise_fails(call: Any, fake: list[Any], scenario: Path, tmp_path: Path) -> None:
     text = scenario.read_text().replace("plant.mass_scale: 2.0", "seed: 7")
     scenario.write_text(text)
-    result = call("run", scenario, "--out", tmp_path, "--counterfactuals")
+    result = call("run", scenario, "--out", tmp_path, "--counterfactuals", "--jobs", 1)
     assert result.exit_code == 1
-    assert "FAIL calm.weak: expected to fail, but passed" in result.output
+    lines = result.output.splitlines()
+    assert lines[-1] == "FAIL calm.weak: expected to fail, but passed"
+    table = [line.split() for line in lines if len(set(line.split()) & {"PASS", "FAIL"}) == 1 and " 2.0 " in line]
+    assert [("FAIL" in row, row[0]) for row in table] == [(False, "calm"), (False, "same"), (True, "calm")]
     failure = ElementTree.parse(tmp_path / "junit.xml").getroot().find("testsuite[@name='calm.weak']/testcase/failure")
     assert failure is not None
     assert "expected to fail" in str(failure.get("message"))
@@ -203,6 +210,7 @@ def one_line(result: Result) -> str:
         (("--set", "duration=.nan"), "--set duration: "),
         (("--set", "duration=[1"), "--set duration: not valid YAML"),
         (("--out", "/dev/null/folder"), "--out /dev/null/folder: "),
+        (("--realtime", "--jobs", "2"), "--jobs 2: real-time runs share no cores"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_2(
@@ -238,10 +246,12 @@ def test_an_internal_error_is_one_line_and_a_traceback_file_and_the_others_still
 
     monkeypatch.setattr(wbmpc.session, "run_scenario", breaks)
     (tmp_path / "broken.json").write_text("of an earlier run")
-    words = ("run", write(tmp_path, "broken"), write(tmp_path, "calm"), "--out", tmp_path)
+    words = ("run", write(tmp_path, "broken"), write(tmp_path, "calm"), "--out", tmp_path, "--jobs", 1)
     result = call(*words)
     assert result.exit_code == 3
-    assert "internal error: IndexError: off by one (traceback in" in result.output
+    assert result.output.splitlines()[-1].startswith(
+        "FAIL broken: internal error: IndexError: off by one (traceback in"
+    )
     assert "Traceback" not in result.output
     assert "Traceback" in (tmp_path / "broken.traceback.txt").read_text()
     assert not (tmp_path / "broken.json").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -127,6 +128,58 @@ def test_sink_and_progress_follow_the_run() -> None:
 
     finished(stand(duration=1.1), sink=Sink(), on_progress=progress.append)
     assert flushed == progress == pytest.approx([0.5, 1.0])
+
+
+def test_a_run_ends_when_it_is_told_to_and_says_why() -> None:
+    answers = iter([None, "seen enough"])
+    timing, recorder = finished(stand(duration=1.6), ended=lambda: next(answers))
+    assert recorder.ticks == 1000
+    assert timing.simulated_time == pytest.approx(1.0)
+    assert recorder.events[-1].text == "seen enough, run ended"
+
+
+def test_a_fallen_robot_ends_its_run() -> None:
+    """Pushed over, the robot falls within a second; without the early end the run would last twenty."""
+    push = [{"kind": "impulse", "body": "torso", "time": 0.1, "duration": 0.1, "impulse": [4.0, 0.0, 0.0]}]
+    scenario = stand(duration=20.0, disturbances=push, planner__horizon_steps=5)
+    result = run_scenario(scenario, name="pushed")
+    assert {"no_fall", "completed"} <= set(result.verdict.failing)
+    fall = next(check.first_violation for check in result.verdict.checks if check.name == "no_fall")
+    assert fall is not None
+    assert fall + 1.0 <= result.recorder.time[-1] + 1.5e-3 <= fall + 2.0
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_the_garbage_collector_is_as_it_was(enabled: bool) -> None:
+    """Off in the loop, and back to its state even when the loop breaks."""
+    seen: list[bool] = []
+
+    def broken() -> str:
+        seen.append(gc.isenabled())
+        raise ZeroDivisionError
+
+    (gc.enable if enabled else gc.disable)()
+    try:
+        with pytest.raises(ZeroDivisionError):
+            finished(stand(duration=0.6), ended=broken)
+        assert (seen, gc.isenabled()) == ([False], enabled)
+    finally:
+        gc.enable()
+
+
+def test_a_tick_leaves_no_garbage() -> None:
+    """What makes it safe to run without the collector: memory is bounded by what is recorded."""
+    finished(stand(duration=0.1))  # what is made once
+    gc.collect()
+    session, _ = new_session(stand(duration=1.0))
+    gc.collect()
+    gc.disable()
+    try:
+        for _ in range(300):
+            session.tick(lambda state: session.mailbox.post(session.planner.solve(state), available_at=state.time))
+        assert gc.collect() < 30  # fewer than one object in ten ticks
+    finally:
+        gc.enable()
 
 
 def test_initial_posture_has_its_joints_and_its_soles_on_the_floor() -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from wbmpc.commands.exits import ExitCode, guarded
+from wbmpc.pool import one_thread_each
 
 app = typer.Typer(
     add_completion=False,
@@ -30,6 +31,7 @@ Overrides = Annotated[
         show_default=False,
     ),
 ]
+Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Parallel processes [one per core].")]
 Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
 
 
@@ -55,6 +57,7 @@ def _options(
     ] = False,
 ) -> None:
     """Options before the command."""
+    one_thread_each()  # before any command imports numpy
 
 
 @app.command("run", help="Run scenarios; write DIR/NAME.rrd, DIR/NAME.json and DIR/junit.xml.")
@@ -68,6 +71,7 @@ def run_command(
     counterfactuals: Annotated[
         bool, typer.Option("--counterfactuals", help="Also run each scenario's counterfactuals.")
     ] = False,
+    jobs: Jobs = None,
     debug: Debug = False,
 ) -> None:
     def work() -> ExitCode:
@@ -81,6 +85,7 @@ def run_command(
             realtime=realtime,
             record=not no_record,
             counterfactuals=counterfactuals,
+            jobs=jobs,
             debug=debug,
         )
         return run(scenarios, options)
@@ -113,7 +118,7 @@ def sweep_command(
     scenario: ScenarioFile,
     overrides: Overrides,
     draws: Annotated[int, typer.Option("--draws", min=1, help="Number of draws.", show_default=False)],
-    jobs: Annotated[int | None, typer.Option(min=1, help="Parallel processes [one per core].")] = None,
+    jobs: Jobs = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws.")] = 0,
     min_rate: Annotated[
         float, typer.Option(min=0, max=1, help="Smallest share of passed draws for exit code 0.")
@@ -164,3 +169,28 @@ def render_command(
         return render(recording, target, options)
 
     raise typer.Exit(guarded(work, traceback_path=Path("out/render.traceback.txt"), debug=debug))
+
+
+@app.command("plot", help="Draw recordings (.rrd): a strip of key moments, and balance, hand forces and footsteps.")
+def plot_command(
+    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="The .rrd files.", show_default=False)],
+    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder [beside the recording].")] = None,
+    suffix: Annotated[str, typer.Option("--format", help="webp, png, or pdf, svg with the strip as webp.")] = "webp",
+    frames: Annotated[int, typer.Option(min=0, max=20, help="Pictures of the strip; 0: no strip.")] = 6,
+    width: Annotated[int, typer.Option(min=16, max=2048, help="[px] of each picture.")] = 210,
+    height: Annotated[int, typer.Option(min=16, max=2048, help="[px]")] = 270,
+    azimuth: Annotated[
+        float | None, typer.Option(help="[deg] direction of view about z: 90 along +y [what shows the motion best].")
+    ] = None,
+    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.05,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.plot import PlotOptions, plot
+
+        options = PlotOptions(
+            out=out, suffix=suffix, frames=frames, size=(width, height), azimuth=azimuth, distance=distance
+        )
+        return plot(recordings, options)
+
+    raise typer.Exit(guarded(work, traceback_path=Path("out/plot.traceback.txt"), debug=debug))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
@@ -16,12 +18,12 @@ from wbmpc.planner.planner import Planner
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
-from wbmpc.scenario import Scenario, build_world, resolve_patches
+from wbmpc.scenario import Scenario, build_world, resolve_obstacles, resolve_patches
 from wbmpc.signals import RobotState, Vector
 from wbmpc.tracker.tracker import Tracker
 
 DIVERGED = 1e6  # [rad/s, m/s] no robot moves so fast: the simulation has lost it
-FLUSH_TICKS = 500  # ticks between two flushes of the recording
+FLUSH_TICKS = 500  # ticks between two flushes of the recording, and two questions whether to go on
 
 
 class Sink(Protocol):
@@ -73,6 +75,7 @@ class Session:
             scenario.planner,
             tasks=scenario.tasks,
             patches=resolve_patches(scenario),
+            obstacles=resolve_obstacles(scenario),
             q=q,
             period=loop.planner_period_ticks * self.step,
         )
@@ -117,6 +120,7 @@ def run_lockstep(
     model: mujoco.MjModel | None = None,
     sink: Sink | None = None,
     on_progress: Callable[[float], None] | None = None,
+    ended: Callable[[], str | None] | None = None,
 ) -> LoopTiming:
     """Run a scenario in simulated time: the same seed gives the same bits on any machine, however slow.
 
@@ -127,6 +131,7 @@ def run_lockstep(
         model: the world; built from the scenario when not given.
         sink: flushed every half simulated second.
         on_progress: called with the simulated time [s] at every flush.
+        ended: asked at every flush; a reason, which goes to the recorder's events, ends the run.
     """
     if model is None:
         model = build_world(scenario, robot.path)
@@ -140,19 +145,36 @@ def run_lockstep(
         recorder.append_plan(solved.report)
         timing.plan_latency.append(delay)
 
-    start = perf_counter()
-    for k in range(session.ticks):
-        due = k % loop.planner_period_ticks == 0 and k > 0
-        if not session.tick(plan if due else None):
-            recorder.event(session.plant.time, "state is not finite, run ended")
-            break
-        if (k + 1) % FLUSH_TICKS == 0:
-            if sink is not None:
-                sink.flush(session.plant.time)
-            if on_progress is not None:
-                on_progress(session.plant.time)
-    timing.wall_time, timing.simulated_time = perf_counter() - start, session.plant.time
+    with no_garbage_collection():
+        start = perf_counter()
+        for k in range(session.ticks):
+            due = k % loop.planner_period_ticks == 0 and k > 0
+            if not session.tick(plan if due else None):
+                recorder.event(session.plant.time, "state is not finite, run ended")
+                break
+            if (k + 1) % FLUSH_TICKS == 0:
+                if sink is not None:
+                    sink.flush(session.plant.time)
+                if on_progress is not None:
+                    on_progress(session.plant.time)
+                if ended is not None and (reason := ended()):
+                    recorder.event(session.plant.time, f"{reason}, run ended")
+                    break
+        timing.wall_time, timing.simulated_time = perf_counter() - start, session.plant.time
     return timing
+
+
+@contextmanager
+def no_garbage_collection() -> Iterator[None]:
+    """Only reference counts free memory inside: a tick leaves no cycles behind, and looking for them takes its time."""
+    collecting = gc.isenabled()
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collecting:
+            gc.enable()
 
 
 def initial_posture(scenario: Scenario, robot: Robot, model: mujoco.MjModel) -> Vector:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -12,7 +11,7 @@ from time import perf_counter, sleep
 
 import mujoco
 
-from wbmpc.loop import FLUSH_TICKS, LoopTiming, Session, Sink
+from wbmpc.loop import FLUSH_TICKS, LoopTiming, Session, Sink, no_garbage_collection
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.recorder import Recorder
@@ -33,6 +32,7 @@ def run_realtime(
     model: mujoco.MjModel | None = None,
     sink: Sink | None = None,
     on_progress: Callable[[float], None] | None = None,
+    ended: Callable[[], str | None] | None = None,
 ) -> LoopTiming:
     """Run a scenario against the wall clock; `run_lockstep` has the same arguments and makes the same ticks.
 
@@ -81,8 +81,12 @@ def run_realtime(
             if not session.tick(exchange):
                 recorder.event(session.plant.time, "state is not finite, run ended")
                 break
-            if on_progress is not None and (k + 1) % FLUSH_TICKS == 0:
-                on_progress(session.plant.time)
+            if (k + 1) % FLUSH_TICKS == 0:
+                if on_progress is not None:
+                    on_progress(session.plant.time)
+                if ended is not None and (reason := ended()):
+                    recorder.event(session.plant.time, f"{reason}, run ended")
+                    break
         timing.wall_time, timing.simulated_time = perf_counter() - start, session.plant.time
     worker.check()
     timing.skipped_plans = worker.skipped
@@ -156,16 +160,13 @@ def _wait_until(deadline: float) -> float:
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """No garbage collection, and short turns of the interpreter, for as long as the loop runs."""
-    collecting, interval = gc.isenabled(), sys.getswitchinterval()
-    gc.collect()
-    gc.disable()
-    sys.setswitchinterval(SWITCH_INTERVAL)
-    try:
-        yield
-    finally:
-        sys.setswitchinterval(interval)
-        if collecting:
-            gc.enable()
+    interval = sys.getswitchinterval()
+    with no_garbage_collection():
+        sys.setswitchinterval(SWITCH_INTERVAL)
+        try:
+            yield
+        finally:
+            sys.setswitchinterval(interval)
 
 
 def _warm_up(scenario: Scenario, robot: Robot, model: mujoco.MjModel) -> None:

@@ -72,6 +72,7 @@ class Camera:
     elevation: float = -14.0  # [deg] negative: from above
     distance: float = 1.15  # [m] from lookat
     lookat: tuple[float, float, float] | None = None  # [m] in world; None: a little before the first picture's CoM
+    follow: bool = False  # each picture is aimed anew, over the floor; the height stays that of the first
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,16 +92,40 @@ def render_frames(footage: Footage, times: Sequence[float], picture: Picture = P
     Raises:
         WbmpcError: a time outside the run, or no OpenGL on this machine.
     """
-    rows = [footage.index(time) for time in times]
+    return _render(footage, [(time, picture.camera) for time in times], picture, segments=False)
+
+
+def render_segments(
+    footage: Footage, times: Sequence[float], cameras: Sequence[Camera], *, size: int
+) -> list[NDArray[np.int32]]:
+    """For each camera and, within it, each time: ids (size, size) of the geoms that are seen, -1: none.
+
+    Raises as `render_frames`.
+    """
+    picture = Picture(width=size, height=size, forces=False, balance=False)
+    shots = [(time, camera) for camera in cameras for time in times]
+    found = _render(footage, shots, picture, segments=True)
+    return [np.where(frame[..., 1] == mujoco.mjtObj.mjOBJ_GEOM, frame[..., 0], -1) for frame in found]
+
+
+def _render(
+    footage: Footage, shots: Sequence[tuple[float, Camera]], picture: Picture, *, segments: bool
+) -> list[NDArray[Any]]:
+    """One frame a shot; `picture` without its camera."""
+    rows = [footage.index(time) for time, _ in shots]
     model = copy(footage.model)  # its off-screen buffer is about to grow; the run's own model stays as it is
     data = mujoco.MjData(model)
-    camera = _aim(picture.camera, footage.com[rows[0]] if rows else np.zeros(3))
     frames = []
     with _renderer(model, picture) as renderer:
-        for row in rows:
+        if segments:
+            renderer.enable_segmentation_rendering()
+        for row, (_, camera) in zip(rows, shots, strict=True):
+            centre = footage.com[rows[0]].copy()
+            if camera.follow:
+                centre[:2] = footage.com[row, :2]
             data.qpos[: footage.qpos.shape[1]] = footage.qpos[row]
             mujoco.mj_forward(model, data)
-            renderer.update_scene(data, camera)
+            renderer.update_scene(data, _aim(camera, centre))
             if picture.forces:
                 _draw_forces(renderer.scene, footage, row)
             if picture.balance:

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from wbmpc.checks.context import CheckContext
+from wbmpc.checks.fall import FallWatch
 from wbmpc.checks.registry import evaluate_checks
 from wbmpc.facts import facts_of
 from wbmpc.loop import LoopTiming, run_lockstep
@@ -63,7 +64,16 @@ def run_scenario(
     recorder = Recorder(robot, expected_ticks=ticks, plant_nq=model.nq, plant_nv=model.nv)
     run = _loop(realtime)
     with _sink(recording, name, scenario, model, robot, recorder, patches) as sink:
-        timing = run(scenario, robot=robot, recorder=recorder, model=model, sink=sink, on_progress=on_progress)
+        fallen = FallWatch(recorder, scenario.universal.no_fall, timestep=model.opt.timestep)
+        timing = run(
+            scenario,
+            robot=robot,
+            recorder=recorder,
+            model=model,
+            sink=sink,
+            on_progress=on_progress,
+            ended=fallen,
+        )
         context = CheckContext(recorder, facts_of(model, robot, scenario, patches))
         verdict = Verdict(
             scenario=name,

@@ -8,10 +8,9 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ import numpy as np
 from pydantic import JsonValue
 
 from wbmpc.errors import WbmpcError
+from wbmpc.pool import Died, finished
 from wbmpc.scenario import Scenario, Variation, load_scenario, vary
 from wbmpc.sweep_journal import Journal
 from wbmpc.verdict import Verdict, finite
@@ -64,7 +64,7 @@ def run_draw(draw: Draw) -> dict[str, Any]:
     """Run one draw; the row of the journal. Nothing in it depends on time or machine load."""
     from wbmpc.session import run_scenario  # MuJoCo, Pinocchio and the solvers: only when something runs
 
-    row: dict[str, Any] = {"draw": draw.index, "seed": draw.seed, "set": dict(draw.values)}
+    row = _begun(draw)
     try:
         scenario = scenario_of(load_scenario(draw.path, draw.overrides), draw)
         verdict = run_scenario(scenario, name=scenario.name, recording=None).verdict
@@ -72,8 +72,16 @@ def run_draw(draw: Draw) -> dict[str, Any]:
         raise
     except Exception as error:  # one draw that breaks the program must not lose the others
         first_line = (str(error).splitlines() or [""])[0]
-        return {**row, "passed": False, "error": f"{type(error).__name__}: {first_line}", "checks": []}
+        return _broken(row, f"{type(error).__name__}: {first_line}")
     return {**row, **_outcome(verdict)}
+
+
+def _begun(draw: Draw) -> dict[str, Any]:
+    return {"draw": draw.index, "seed": draw.seed, "set": dict(draw.values)}
+
+
+def _broken(row: dict[str, Any], error: str) -> dict[str, Any]:
+    return {**row, "passed": False, "error": error, "checks": []}
 
 
 def _outcome(verdict: Verdict) -> dict[str, Any]:
@@ -100,7 +108,8 @@ def run_draws(
     """Run the draws that the journal does not have yet, in `jobs` processes.
 
     Args:
-        on_done: called with the row of each draw when it is finished and safely in the journal.
+        on_done: called with the row of each draw when it is finished and safely in the journal; a draw whose process
+            died is reported, and run again when the sweep is resumed.
         work: what runs one draw; importable by name, since processes are spawned.
 
     Returns:
@@ -108,26 +117,16 @@ def run_draws(
     """
     rows = {row["draw"]: row for row in journal.rows}
     todo = [draw for draw in draws if draw.index not in rows]
-    for row in _finished(todo, min(jobs, len(todo)), work):
-        journal.append(row)
-        rows[row["draw"]] = row
-        on_done(row)
+    with closing(finished(work, todo, jobs=jobs)) as results:
+        for index, result in results:
+            if isinstance(result, Died):
+                row = _broken(_begun(todo[index]), result.reason)  # not in the journal: may be well another time
+            else:
+                row = result
+                journal.append(row)
+            rows[row["draw"]] = row
+            on_done(row)
     return [rows[draw.index] for draw in draws]
-
-
-def _finished(draws: Sequence[Draw], jobs: int, work: Callable[[Draw], dict[str, Any]]) -> Iterator[dict[str, Any]]:
-    """Rows of the draws as they finish; in this process when one is enough."""
-    if jobs <= 1:
-        yield from map(work, draws)
-        return
-    # Spawned, not forked: solver libraries hold threads and locks that do not survive a fork.
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(work, draw) for draw in draws]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
 
 
 def severity(row: Mapping[str, Any], ignored: Sequence[str] = ()) -> tuple[int, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cholesky, qr, solve_triangular
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear, nnls
 
 from wbmpc.signals import Vector
 
@@ -110,6 +110,9 @@ def _least_distance(G: Vector, h: Vector) -> Vector:
     target = np.zeros(len(E))
     target[-1] = 1.0
     u, _ = nnls(E, target, maxiter=20 * len(h))
+    if (E.T @ (target - E @ u)).max() > 1e-9:  # SciPy's nnls stops early at times, where constraints are degenerate
+        u = lsq_linear(E, target, bounds=(0.0, np.inf), method="bvls", tol=1e-14, max_iter=20 * len(h)).x
+    assert (E.T @ (target - E @ u)).max() < 1e-9, "the reference has no optimum to compare with"
     residual = E @ u - target
     if -residual[-1] < 1e-10:
         raise InfeasibleReference("no point satisfies the constraints")

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from wbmpc.planner.reach import GATE_TIME, Reach, ReachPhase
+from wbmpc.planner.progress import GATE_TIME, TaskPhase
+from wbmpc.planner.reach import Reach
 from wbmpc.scenario import ReachTask
 from wbmpc.signals import Vector
 
@@ -37,25 +38,28 @@ class Bench:
         ):
             values.append(value)
 
-    def run_to(self, phase: ReachPhase, seconds: float = 12.0) -> float:
+    def preview(self, seconds: Vector, *, rate: float) -> Vector:
+        return self.reach.preview(self.reach.progress.sigmas(self.time, seconds, rate=rate))
+
+    def run_to(self, phase: TaskPhase, seconds: float = 12.0) -> float:
         begin = self.time
-        while self.reach.phase != phase:
+        while self.reach.progress.phase != phase:
             self.step()
-            assert self.time - begin < seconds, f"stuck in {self.reach.phase.name}"
+            assert self.time - begin < seconds, f"stuck in {self.reach.progress.phase.name}"
         return self.time - begin
 
 
 def test_a_reach_takes_its_times() -> None:
     bench = Bench()
-    assert not bench.reach.active
-    assert bench.run_to(ReachPhase.GO) == pytest.approx(TASK.start, abs=2 * DT)
-    assert bench.reach.active
-    assert bench.run_to(ReachPhase.HOLD) == pytest.approx(TASK.arrive_by - TASK.start, abs=3 * DT)
+    assert not bench.reach.progress.active
+    assert bench.run_to(TaskPhase.GO) == pytest.approx(TASK.start, abs=2 * DT)
+    assert bench.reach.progress.active
+    assert bench.run_to(TaskPhase.HOLD) == pytest.approx(TASK.arrive_by - TASK.start, abs=3 * DT)
     assert_allclose(bench.reach.reference()[0], TASK.target, atol=1e-9)
-    assert bench.run_to(ReachPhase.BACK) == pytest.approx(TASK.hold, abs=2 * DT)
-    assert bench.run_to(ReachPhase.DONE) == pytest.approx(TASK.withdraw, abs=3 * DT)
+    assert bench.run_to(TaskPhase.BACK) == pytest.approx(TASK.hold, abs=2 * DT)
+    assert bench.run_to(TaskPhase.DONE) == pytest.approx(TASK.withdraw, abs=3 * DT)
     assert_allclose(bench.reach.reference()[0], START, atol=1e-9)
-    assert not bench.reach.active
+    assert not bench.reach.progress.active
 
 
 @settings(max_examples=30)
@@ -64,7 +68,7 @@ def test_velocity_and_acceleration_scale_with_the_clock(gates: list[tuple[bool, 
     """However the gate opens and closes, the references are each other's derivatives (finite differences)."""
     bench = Bench()
     plan = [gate_open for gate_open, count in gates for _ in range(count)]
-    while bench.reach.phase in (ReachPhase.WAIT, ReachPhase.GO):
+    while bench.reach.progress.phase in (TaskPhase.WAIT, TaskPhase.GO):
         bench.step(gate_open=plan.pop() if plan else True)
     p, v, a = (np.array(x[:-1]) for x in (bench.positions, bench.velocities, bench.accelerations))
     assert_allclose((p[1:] - p[:-1]) / DT, 0.5 * (v[1:] + v[:-1]), atol=0.02)
@@ -80,43 +84,43 @@ def test_a_closed_gate_stops_the_reach_smoothly_and_an_open_one_resumes_it() -> 
         bench.step()
     for _ in range(round(GATE_TIME / DT) + 1):
         bench.step(gate_open=False)
-    stopped = bench.reach.sigma
-    assert bench.reach.rate == 0.0
+    stopped = bench.reach.progress.sigma
+    assert bench.reach.progress.rate == 0.0
     assert 0.0 < stopped < 1.0
     for _ in range(200):
         bench.step(gate_open=False)
-    assert bench.reach.sigma == stopped
+    assert bench.reach.progress.sigma == stopped
     assert_allclose(bench.reach.reference()[1], 0.0, atol=1e-12)
-    bench.run_to(ReachPhase.HOLD)
+    bench.run_to(TaskPhase.HOLD)
     speeds = np.linalg.norm(np.diff(np.array(bench.velocities), axis=0), axis=1)
     assert speeds.max() < 0.02  # no jump of velocity anywhere
 
 
 def test_the_way_back_is_not_gated() -> None:
     bench = Bench()
-    bench.run_to(ReachPhase.BACK)
+    bench.run_to(TaskPhase.BACK)
     begin = bench.time
-    while bench.reach.phase == ReachPhase.BACK:
+    while bench.reach.progress.phase == TaskPhase.BACK:
         bench.step(gate_open=False)
         assert bench.time < begin + TASK.withdraw + 0.1
 
 
 def test_the_hold_counts_without_a_break() -> None:
     bench = Bench()
-    bench.run_to(ReachPhase.HOLD)
+    bench.run_to(TaskPhase.HOLD)
     for _ in range(60):
         bench.step()
     bench.error = np.array([0.02, 0.0, 0.0])
     bench.step()
     bench.error = np.zeros(3)
-    assert bench.run_to(ReachPhase.BACK) == pytest.approx(TASK.hold, abs=2 * DT)  # from zero again
+    assert bench.run_to(TaskPhase.BACK) == pytest.approx(TASK.hold, abs=2 * DT)  # from zero again
 
 
 def test_a_hold_that_never_succeeds_ends_with_its_patience() -> None:
     bench = Bench()
     bench.error = np.array([0.0, 0.02, 0.0])
-    bench.run_to(ReachPhase.HOLD)
-    assert bench.run_to(ReachPhase.BACK) == pytest.approx(TASK.hold + TASK.patience, abs=2 * DT)
+    bench.run_to(TaskPhase.HOLD)
+    assert bench.run_to(TaskPhase.BACK) == pytest.approx(TASK.hold + TASK.patience, abs=2 * DT)
 
 
 @pytest.mark.parametrize("at", [0.1, 0.9, 1.7])
@@ -126,7 +130,7 @@ def test_preview_is_what_comes(at: float) -> None:
     while bench.time < at:
         bench.step()
     seconds = np.array([0.1, 0.5, 1.0])
-    ahead = bench.reach.preview(bench.time, seconds, rate=1.0)
+    ahead = bench.preview(seconds, rate=1.0)
     first = len(bench.positions)
     for _ in range(100):
         bench.step()
@@ -138,6 +142,6 @@ def test_preview_at_no_pace_stays() -> None:
     bench = Bench()
     while bench.time < 1.5:
         bench.step()
-    stay = bench.reach.preview(bench.time, np.array([0.1, 1.6]), rate=0.0)
+    stay = bench.preview(np.array([0.1, 1.6]), rate=0.0)
     assert_allclose(stay, np.tile(bench.reach.reference()[0], (2, 1)))
-    assert bench.reach.preview(bench.time, np.array([1.6]), rate=1.0)[0, 0] == pytest.approx(TASK.target[0])
+    assert bench.preview(np.array([1.6]), rate=1.0)[0, 0] == pytest.approx(TASK.target[0])

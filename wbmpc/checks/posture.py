@@ -6,6 +6,7 @@ import numpy as np
 
 from wbmpc.checks import settings
 from wbmpc.checks.context import CONTACT_FORCE, CheckContext
+from wbmpc.checks.fall import down
 from wbmpc.checks.result import CheckResult, at_least, at_most, failed, first_time
 
 
@@ -39,8 +40,7 @@ class NoFallCheck:
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
         recorder, config = context.recorder, self.config
         height = recorder.com[:, 2] - recorder.sole_position[:, :, 2].min(axis=1)  # (n,)
-        low = first_time(context.time, ~(height >= config.min_com_height))
-        tilted = first_time(context.time, ~(recorder.torso_up >= config.min_torso_up))
+        low, tilted = (first_time(context.time, violated) for violated in down(recorder, config))
         message = f"torso's cosine at least {recorder.torso_up.min():.3f}, CoM height at least {height.min():.3f} m"
         if low is not None and (tilted is None or low < tilted):
             return at_least(name, float(height.min()), config.min_com_height, "m", message, when=low)

@@ -63,6 +63,14 @@ def say_bad_input(error: WbmpcError) -> None:
 
 def report_internal_error(error: Exception, traceback_path: Path, *, debug: bool) -> None:
     """One line on standard error, the traceback in a file."""
+    line, text = write_traceback(error, traceback_path)
+    say(line)
+    if debug:
+        say(text)
+
+
+def write_traceback(error: Exception, traceback_path: Path) -> tuple[str, str]:
+    """Write the traceback to a file; one line that says so, and the traceback."""
     text = "".join(traceback.format_exception(error))
     try:
         traceback_path.parent.mkdir(parents=True, exist_ok=True)
@@ -71,6 +79,4 @@ def report_internal_error(error: Exception, traceback_path: Path, *, debug: bool
     except OSError as reason:
         where = f"no traceback written: {reason}"
     first_line = (str(error).splitlines() or [""])[0]
-    say(f"internal error: {type(error).__name__}: {first_line} ({where})")
-    if debug:
-        say(text)
+    return f"internal error: {type(error).__name__}: {first_line} ({where})", text

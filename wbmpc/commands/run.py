@@ -1,25 +1,23 @@
-"""`wbmpc run`: scenarios, their counterfactuals, and the files that they leave."""
+"""`wbmpc run`: scenarios and their counterfactuals, in parallel processes, and the files that they leave."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from pydantic import JsonValue
 
-from wbmpc.commands.exits import ExitCode, report_internal_error
-from wbmpc.commands.progress import simulated_time
-from wbmpc.commands.tables import final_line, print_checks
-from wbmpc.counterfactuals import objection
+from wbmpc.commands.exits import ExitCode, say
+from wbmpc.commands.one_run import Job, Outcome, broken, carry_out
+from wbmpc.commands.progress import counted, simulated_time
+from wbmpc.commands.summary import print_runs
+from wbmpc.commands.tables import print_checks
 from wbmpc.errors import WbmpcError
-from wbmpc.junit import Case, Suite, case_of, write_junit
-from wbmpc.recorder import Recorder
-from wbmpc.scenario import Counterfactual, Scenario, counterfactual, load_scenario
-from wbmpc.verdict import Verdict
-
-LAST_STATES = 200  # ticks kept of a run that went non-finite
+from wbmpc.junit import write_junit
+from wbmpc.pool import Died, available_cores, finished
+from wbmpc.scenario import counterfactual, load_scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,16 +30,8 @@ class RunOptions:
     realtime: bool
     record: bool
     counterfactuals: bool
+    jobs: int | None  # parallel processes; None: one per core, one for a real-time run
     debug: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One run to make."""
-
-    name: str  # names the files: NAME or NAME.COUNTERFACTUAL
-    scenario: Scenario
-    counterfactual: Counterfactual | None
 
 
 def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
@@ -49,36 +39,48 @@ def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
 
     Raises:
         ScenarioError: a scenario or an override is not valid.
-        WbmpcError: two scenarios would write the same files, or the output folder cannot be made.
+        WbmpcError: two scenarios would write the same files, the output folder cannot be made, or real-time runs were
+            asked for in parallel.
     """
+    if options.realtime and (options.jobs or 1) > 1:
+        raise WbmpcError(f"--jobs {options.jobs}: real-time runs share no cores, run them one at a time")
     jobs = [job for path in paths for job in jobs_of(path, options)]
     names = [job.name for job in jobs]
     for name in names:
         if names.count(name) > 1:
             raise WbmpcError(f"two scenarios are named {name!r}: their results would overwrite each other")
     make_folder(options.out)
-    suites: list[Suite] = []
-    lines: list[str] = []
-    code = ExitCode.PASSED
     for job in jobs:
-        job_code, suite, line = _run_job(job, options)
-        code = max(code, job_code)
-        suites.append(suite)
-        lines.append(line)
-        write_junit(options.out / "junit.xml", suites)  # after every run: a killed session leaves what it has
-    print("\n".join(lines), flush=True)
-    return code
+        job.remove_files()
+    outcomes: dict[int, Outcome] = {}
+    interrupted = False
+    try:
+        with closing(_outcomes(jobs, options)) as results:
+            for index, outcome in results:
+                outcomes[index] = outcome
+                if options.debug and outcome.traceback:
+                    say(outcome.traceback)
+                # After every run: a killed session leaves what it has.
+                write_junit(options.out / "junit.xml", [outcomes[k].suite for k in sorted(outcomes)])
+    except KeyboardInterrupt:
+        interrupted = True
+    _report([(jobs[k], outcomes[k]) for k in sorted(outcomes)], single=len(jobs) == 1)
+    if interrupted:
+        say(f"interrupted: {len(outcomes)} of {len(jobs)} runs finished, their results are in {options.out}")
+        return ExitCode.INTERRUPTED
+    if len(jobs) > 1 and all(outcome.code is ExitCode.PASSED for outcome in outcomes.values()):
+        print(f"PASS: all {len(jobs)} runs ended as declared", flush=True)
+    return max(outcome.code for outcome in outcomes.values())
 
 
 def jobs_of(path: Path, options: RunOptions) -> list[Job]:
     """The run of one scenario file, then those of its counterfactuals when asked for."""
     scenario = load_scenario(path, options.overrides, options.seed)
-    jobs = [Job(scenario.name, scenario, None)]
+    rest = (options.out, options.record, options.realtime)
+    jobs = [Job(scenario, "", None, *rest)]
     if options.counterfactuals:
-        jobs += [
-            Job(f"{scenario.name}.{name}", counterfactual(scenario, name), declared)
-            for name, declared in scenario.counterfactuals.items()
-        ]
+        declared = scenario.counterfactuals.items()
+        jobs += [Job(counterfactual(scenario, name), name, change, *rest) for name, change in declared]
     return jobs
 
 
@@ -90,49 +92,35 @@ def make_folder(folder: Path) -> None:
         raise WbmpcError(f"--out {folder}: {error.strerror}") from None
 
 
-def _run_job(job: Job, options: RunOptions) -> tuple[ExitCode, Suite, str]:
-    """Run, write NAME.json, print the table; the exit code, the junit suite and the final line."""
-    from wbmpc.session import run_scenario  # MuJoCo, Pinocchio and the solvers: only when something runs
-
-    recording = options.out / f"{job.name}.rrd" if options.record else None
-    for suffix in ("json", "rrd", "traceback.txt"):  # results of an earlier run must not pass for this one's
-        (options.out / f"{job.name}.{suffix}").unlink(missing_ok=True)
-    try:
-        with simulated_time(job.name, job.scenario.duration) as on_progress:
-            result = run_scenario(
-                job.scenario, name=job.name, recording=recording, realtime=options.realtime, on_progress=on_progress
-            )
-        result.verdict.write(options.out / f"{job.name}.json")
-        dump_last_states(result.recorder, options.out / f"{job.name}.last_states.npz")
-    except WbmpcError:
-        raise
-    except Exception as error:
-        report_internal_error(error, options.out / f"{job.name}.traceback.txt", debug=options.debug)
-        text = f"internal error: {type(error).__name__}: {error}"
-        return ExitCode.INTERNAL_ERROR, Suite(job.name, 0.0, [Case("run", text)]), f"FAIL {job.name}: {text}"
-    return _report(job, result.verdict, result.wall_time)
-
-
-def dump_last_states(recorder: Recorder, path: Path) -> None:
-    """Write the last ticks of a run whose state became non-finite; remove the file of an earlier run otherwise."""
-    if np.isfinite(recorder.qpos).all() and np.isfinite(recorder.qvel).all() and np.isfinite(recorder.torque).all():
-        path.unlink(missing_ok=True)
+def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, Outcome], None, None]:
+    """Index and outcome of every run, as they finish."""
+    if len(jobs) == 1:
+        with simulated_time(jobs[0].name, jobs[0].scenario.duration) as on_progress:
+            outcome = carry_out(jobs[0], on_progress)
+        yield 0, outcome
         return
-    last = {name: recorder.column(name)[-LAST_STATES:] for name in ("time", "qpos", "qvel", "torque")}
-    np.savez(path, allow_pickle=False, **last)
+    processes = options.jobs or (1 if options.realtime else available_cores())
+    order = list(range(len(jobs)))
+    if processes > 1:  # longest first: a long run that begins last would keep one core busy and the others waiting
+        order.sort(key=lambda k: -jobs[k].scenario.duration)
+    with (
+        counted("runs", len(jobs), 0) as advance,
+        closing(finished(carry_out, [jobs[k] for k in order], jobs=processes)) as results,
+    ):
+        for place, result in results:
+            index = order[place]
+            outcome = broken(jobs[index], result.reason) if isinstance(result, Died) else result
+            advance(outcome.line)
+            yield index, outcome
 
 
-def _report(job: Job, verdict: Verdict, wall_time: float) -> tuple[ExitCode, Suite, str]:
-    title = f"{job.name}  (seed {verdict.seed}, real-time factor {verdict.real_time_factor:.2f})"
-    print_checks(title, verdict.checks)
-    if job.counterfactual is None:
-        failures = [check for check in verdict.checks if not check.passed]
-        code = ExitCode.FAILED if failures else ExitCode.PASSED
-        suite = Suite(job.name, wall_time, [case_of(check) for check in verdict.checks])
-        return code, suite, final_line(job.name, failures)
-    # A counterfactual is one test: whether the run ended as declared.
-    wrong = objection(job.counterfactual, verdict)
-    code = ExitCode.PASSED if wrong is None else ExitCode.FAILED
-    outcome = "passes" if verdict.passed else f"fails {', '.join(verdict.failing)}"
-    line = f"PASS {job.name}: {outcome}, as declared" if wrong is None else final_line(job.name, [], wrong)
-    return code, Suite(job.name, wall_time, [Case("counterfactual", wrong)]), line
+def _report(ended: Sequence[tuple[Job, Outcome]], *, single: bool) -> None:
+    """A single run: its checks. Several: a table of runs, then a line for each that went wrong."""
+    if ended and not single:
+        print_runs(ended)
+    for job, outcome in ended:
+        if single and outcome.checks:
+            title = f"{job.name}  (seed {outcome.seed}, real-time factor {outcome.real_time_factor:.2f})"
+            print_checks(title, outcome.checks)
+        if single or outcome.code is not ExitCode.PASSED:
+            print(outcome.line, flush=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from wbmpc.commands.progress import counted
 from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import console, number
 from wbmpc.errors import WbmpcError
+from wbmpc.pool import available_cores
 from wbmpc.scenario import load_scenario, robot_path
 from wbmpc.sweep import Draw, draw_values, header_of, run_draws, scenario_of, severity
 from wbmpc.sweep_journal import Journal
@@ -67,7 +67,7 @@ def sweep(path: Path, options: SweepOptions) -> ExitCode:
     done = sum(row["draw"] < options.draws for row in journal.rows)
     if done:
         say(f"{done} of {options.draws} draws are done already, going on")
-    jobs = options.jobs or os.cpu_count() or 1
+    jobs = options.jobs or available_cores()
     with counted(scenario.name, options.draws, done) as advance:
         rows = run_draws(draws, journal, jobs=jobs, on_done=lambda row: advance(_word(row)))
     document = summary(scenario.name, options.seed, rows, header)

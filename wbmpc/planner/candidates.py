@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wbmpc.planner.contact_force import ContactChoice, Need
+from wbmpc.planner.contact_choice import ContactChoice, Option
+from wbmpc.planner.contact_force import Need
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
@@ -49,10 +50,12 @@ class Candidates:
             for hand in range(len(SIDES))
         ]
         self._turn = 0
+        self._left = np.array([0.0, 1.0])  # unit, to the robot's left
         self._backend = backend
         slots = min(len(self.all), settings.most_candidates)
         self._choice = ContactChoice(slots, settings, mass=robot.mass, backend=backend) if slots else None
-        self._single = ContactChoice(1, settings, mass=robot.mass, backend="daqp") if slots else None
+        most = settings.most_contacts
+        self._given = ContactChoice(most, settings, mass=robot.mass, backend="daqp") if slots else None
         self._slots = slots
 
     def refresh(self, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int, everyone: bool = False) -> None:
@@ -61,6 +64,8 @@ class Candidates:
             return
         turn = self.all if everyone else [self.all[self._turn % len(self.all)]]
         self._turn += 1
+        heading = float(np.mean(yaws))
+        self._left = np.array([-np.sin(heading), np.cos(heading)])
         for candidate in turn:
             palms: list[Vector | None] = [None, None]
             palms[candidate.hand] = candidate.goal(self._robot.palm_radius)
@@ -73,78 +78,109 @@ class Candidates:
         return min(palm, com)
 
     def choose(
-        self, need: Need, *, palms: Vector, free_hands: list[bool], polygon: SupportPolygon
-    ) -> tuple[Candidate | None, tuple[CandidateReport, ...], StageReport]:
+        self, need: Need, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon
+    ) -> tuple[list[Candidate], tuple[CandidateReport, ...], StageReport]:
         """Stage 3 for a need of ContactChoice.KNOTS knots.
 
         Args:
             palms: (2, 3) where the palms are [m]: closer patches are cheaper.
             free_hands: which hands may take a contact.
-            polygon: where the CoM may be before the contact carries load.
+            held: contacts taken before, which keep their share of the load.
+            polygon: where the CoM may be before a new contact carries load.
 
         Returns:
-            The winner (None: no candidate can help), a report on every candidate, and the MIQP's own report.
+            The candidates to take (none: none can help), a report on every candidate, and the MIQP's own report.
         """
-        if self._choice is None or self._single is None:
-            return None, (), StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
-        considered: list[tuple[Candidate, float, float]] = []
-        reasons: dict[int, str] = {}
-        for candidate in self.all:
-            slack = self.reach_slack(candidate, polygon)
-            distance = float(np.linalg.norm(candidate.goal(self._robot.palm_radius) - palms[candidate.hand]))
-            if not free_hands[candidate.hand]:
-                reasons[id(candidate)] = "hand is in use"
-            elif candidate.excluded:
-                reasons[id(candidate)] = "tried before, nothing was there"
-            elif slack < 0.0:
-                reasons[id(candidate)] = f"unreachable by {-100.0 * slack:.1f} cm"
-            else:
-                considered.append((candidate, distance, slack))
-        considered.sort(key=lambda entry: entry[1])
-        for candidate, _, _ in considered[self._slots :]:
-            reasons[id(candidate)] = f"beyond the {self._slots} nearest"
-        considered = considered[: self._slots]
-        winner, stage, best = None, StageReport(SolveStatus.INFEASIBLE, 0.0, 0), np.inf
-        costs: dict[int, tuple[float, Vector]] = {}
-        if considered:
-            prices = np.array([self._settings.distance_cost * distance for _, distance, _ in considered])
-            choice = self._choice.solve(need, [c.patch for c, _, _ in considered], prices)
+        if self._choice is None:
+            return [], (), StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
+        distances, reasons = self._sort_out(palms=palms, free_hands=free_hands, held=held, polygon=polygon)
+        considered = [c for c in self.all if id(c) not in reasons]
+        considered.sort(key=lambda candidate: distances[id(candidate)])
+        room = self._slots - len(held)
+        for candidate in considered[room:]:
+            reasons[id(candidate)] = f"beyond the {room} nearest"
+        considered = considered[:room]
+        options = [Option(c.patch, c.hand, self._settings.distance_cost * distances[id(c)]) for c in considered]
+        winners: list[Candidate] = []
+        best, stage = np.inf, StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
+        if options:
+            choice = self._choice.solve(need, [*held, *options], left=self._left)
             stage = StageReport(choice.solution.status, choice.solution.solve_time, choice.solution.iterations)
-            if choice.winner >= 0:
-                winner = considered[choice.winner][0]
-            for (candidate, _, _), price in zip(considered, prices, strict=True):
-                alone = self._single.solve(need, [candidate.patch], np.array([price]))
-                cost = self._single.problem.objective(alone.solution.x) if alone.winner >= 0 else np.inf
-                costs[id(candidate)] = (cost, alone.forces[0, 0])
-                if candidate is winner:
-                    best = cost
+            winners, best = [considered[i - len(held)] for i in choice.winners], choice.objective
+        weighed = {id(c): option for c, option in zip(considered, options, strict=True)}
         reports = []
         for candidate in self.all:
-            cost, force = costs.get(id(candidate), (np.inf, np.zeros(3)))
-            if candidate is winner:
-                reason = "chosen"
-            elif id(candidate) in reasons:
-                reason = reasons[id(candidate)]
-            elif np.isfinite(cost):
-                reason = f"cost {cost - best:.3g} above the best"
-            else:
-                reason = "no force in its cone gives the shift"
+            cost, forces, reason = np.inf, np.zeros((ContactChoice.KNOTS, 3)), reasons.get(id(candidate), "")
+            if id(candidate) in weighed:
+                company = [weighed[id(w)] for w in winners if w is not candidate and w.hand != candidate.hand]
+                if len(winners) + len(held) < self._settings.most_contacts:
+                    company = []  # it could take the single winner's place, whichever hand that has
+                cost, forces = self._cost_of(need, weighed[id(candidate)], [*held, *company])
+                reason = _reason(candidate, cost, best=best, winners=winners, company=bool(held or company))
             reports.append(
                 CandidateReport(
                     patch=candidate.patch.name,
                     hand=candidate.hand,
-                    chosen=candidate is winner,
-                    cost=float(cost),
+                    chosen=any(w is candidate for w in winners),
+                    cost=cost,
                     reach_slack=self.reach_slack(candidate, polygon),
-                    friction_margin=_friction_margin(candidate.patch, force) if np.isfinite(cost) else float("nan"),
-                    force=force,
+                    friction_margin=_friction_margin(candidate.patch, forces) if np.isfinite(cost) else float("nan"),
+                    force=forces[0],
                     reason=reason,
                 )
             )
-        return winner, tuple(reports), stage
+        return winners, tuple(reports), stage
+
+    def carry(self, need: Need, contacts: list[Option]) -> float:
+        """Stage 3's objective with these contacts and no other; inf when they cannot give what is needed."""
+        if self._given is None or not contacts:
+            return np.inf
+        return self._given.solve(need, [replace(contact, held=True) for contact in contacts], left=self._left).objective
+
+    def _sort_out(
+        self, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon
+    ) -> tuple[dict[int, float], dict[int, str]]:
+        """Way of the palm to each candidate [m], and why some are out of the question; both by id of the candidate."""
+        distances: dict[int, float] = {}
+        reasons: dict[int, str] = {}
+        for candidate in self.all:
+            key, slack = id(candidate), self.reach_slack(candidate, polygon)
+            goal = candidate.goal(self._robot.palm_radius)
+            distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
+            if any(option.patch is candidate.patch and option.hand == candidate.hand for option in held):
+                reasons[key] = "held already"
+            elif any(option.patch is candidate.patch for option in held):
+                reasons[key] = "patch is in use"
+            elif not free_hands[candidate.hand]:
+                reasons[key] = "hand is in use"
+            elif candidate.excluded:
+                reasons[key] = "tried before, nothing was there"
+            elif slack < 0.0:
+                reasons[key] = f"unreachable by {-100.0 * slack:.1f} cm"
+        return distances, reasons
+
+    def _cost_of(self, need: Need, option: Option, company: list[Option]) -> tuple[float, Vector]:
+        """Objective with this option taken beside `company`, prices included, and its forces (KNOTS, 3) [N]."""
+        assert self._given is not None
+        together = [replace(other, held=True) for other in (option, *company)]
+        answer = self._given.solve(need, together, left=self._left)
+        price = option.price + sum(other.price for other in company if not other.held)
+        return answer.objective + price, answer.forces[0]
 
 
-def _friction_margin(patch: PatchPose, force: Vector) -> float:
-    """μ f_n − |f_t| [N] of a force (3,) in world."""
-    normal = float(force @ patch.normal)
-    return patch.friction * normal - float(np.linalg.norm(force - normal * patch.normal))
+def _reason(candidate: Candidate, cost: float, *, best: float, winners: list[Candidate], company: bool) -> str:
+    """Why a candidate that stage 3 weighed won or lost."""
+    if any(winner is candidate for winner in winners):
+        return "chosen" if len(winners) == 1 else "chosen, with another"
+    if any(winner.patch is candidate.patch for winner in winners):
+        return "patch is taken by the other hand"
+    if np.isfinite(cost):
+        return f"cost {cost - best:.3g} above the best"
+    return "does not do beside the others" if company else "no force in its cone gives the shift"
+
+
+def _friction_margin(patch: PatchPose, forces: Vector) -> float:
+    """Smallest μ f_n − |f_t| [N] of forces (n, 3) in world."""
+    normal = forces @ patch.normal
+    tangential = np.linalg.norm(forces - normal[:, None] * patch.normal, axis=1)
+    return float(np.min(patch.friction * normal - tangential))

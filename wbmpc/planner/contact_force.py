@@ -1,14 +1,14 @@
-"""Stage 3: which available contact to take and with what force, a mixed-integer QP ([M] eqs. neweq, QP2)."""
+"""Stage 3 with the contacts given: what forces do to the feet's ZMP, and the forces at every knot ([M] eq. neweq)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import MAX_EDGES, SupportPolygon
-from wbmpc.qp import QpSolution, QuadraticProgram, make_mip_workspace, make_workspace
+from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
 from wbmpc.rotations import contact_frame
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SolveStatus, Vector
@@ -43,6 +43,10 @@ class Need:
             polygons=tuple(self.polygons[k] for k in knots),
             phantom=self.phantom[knots],
         )
+
+    def inset(self, margin: float) -> Need:
+        """The same need with every polygon shrunk by a further `margin` [m]; negative: grown."""
+        return replace(self, polygons=tuple(polygon.shrunk(margin) for polygon in self.polygons))
 
 
 def shift_rows(need: Need, point: Vector) -> Vector:
@@ -98,102 +102,6 @@ def force_price(patch: PatchPose, settings: ContactSettings, mass: float) -> Vec
     """Hessian (3, 3) [cost / N²] of one force: the normal part, and the tangential part at its own price."""
     along = np.outer(patch.normal, patch.normal)
     return (settings.force_cost * along + settings.tangent_cost * (np.eye(3) - along)) / (mass * GRAVITY) ** 2
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """Stage 3's answer when it fires."""
-
-    winner: int  # index of the candidate, -1 when none can give the wanted shift
-    forces: Vector  # (candidates, knots, 3) [N] in world; only the winner's row is non-zero
-    objective: float
-    solution: QpSolution
-
-
-class ContactChoice:
-    """minimise  Σ_i w_i H_i + w_f Σ|f|²/(mg)² + w_s |G f − h|²   over forces f_i of every candidate i and binaries H_i
-
-    subject to  n_i·f_i ≤ f_max H_i  (big-M: the force cap),  f_i in its friction cone,  ΣH_i = 1,
-                Σ_i P f_i ≤ q        the feet's ZMP inside the support polygon.
-
-    The shift equalities are softened because x and y share one force: a brace that gives ΔZ_x gives a ΔZ_y too, and
-    the polygon says how much of it the feet can take. The sums couple the candidates; the problem stays exact.
-    """
-
-    KNOTS = 2
-
-    def __init__(self, candidates: int, settings: ContactSettings, *, mass: float, backend: str) -> None:
-        self._candidates, self._settings = candidates, settings
-        forces = 3 * self.KNOTS * candidates
-        knot_rows = 2 + MAX_EDGES
-        rows = self.KNOTS * knot_rows + candidates * self.KNOTS * 5 + 1
-        soft = np.zeros(rows)
-        for knot in range(self.KNOTS):
-            # the equality is in N m; the slack's price is per metre of shift
-            soft[knot * knot_rows : knot * knot_rows + 2] = settings.shift_slack_cost / (mass * GRAVITY) ** 2
-        self.problem = QuadraticProgram(
-            forces + candidates, rows, soft_weight=soft, binary=range(forces, forces + candidates)
-        )
-        self._mass = mass
-        self._forces, self._knot_rows = forces, knot_rows
-        self._workspace = make_mip_workspace(backend, self.problem)
-
-    def solve(self, need: Need, patches: list[PatchPose], weights: Vector) -> Choice:
-        """Choose among `patches` (at most as many as built for) for a need of KNOTS knots.
-
-        Args:
-            weights: (len(patches),) w_i, the price of taking candidate i.
-        """
-        qp, forces, slots = self.problem, self._forces, self._candidates
-        qp.matrix[:] = 0.0
-        qp.gradient[:] = 0.0
-        qp.x_lower[:forces], qp.x_upper[:forces] = -np.inf, np.inf
-        qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
-        # solvers want strict convexity; unused slots and binaries have no curvature of their own
-        qp.hessian[:] = 1e-6 * np.eye(forces + slots)
-        h, q = shift_bound(need), polygon_bound(need)
-        for knot in range(self.KNOTS):
-            first = knot * self._knot_rows
-            qp.lower[first : first + 2] = qp.upper[first : first + 2] = h[knot]
-            qp.lower[first + 2 : first + self._knot_rows] = -np.inf
-            qp.upper[first + 2 : first + self._knot_rows] = q[knot]
-        row = self.KNOTS * self._knot_rows
-        for i in range(slots):
-            block = slice(3 * self.KNOTS * i, 3 * self.KNOTS * (i + 1))
-            if i >= len(patches):
-                qp.x_lower[block] = qp.x_upper[block] = 0.0
-                qp.x_upper[forces + i] = 0.0
-                qp.lower[row : row + 5 * self.KNOTS], qp.upper[row : row + 5 * self.KNOTS] = -np.inf, 0.0
-                row += 5 * self.KNOTS
-                continue
-            patch = patches[i]
-            qp.gradient[forces + i] = weights[i]
-            cone = cone_rows(patch)
-            price = force_price(patch, self._settings, self._mass)
-            G, P = shift_rows(need, patch.position), polygon_rows(need, patch.position)
-            for knot in range(self.KNOTS):
-                columns = slice(3 * (self.KNOTS * i + knot), 3 * (self.KNOTS * i + knot) + 3)
-                first = knot * self._knot_rows
-                qp.hessian[columns, columns] = price
-                qp.matrix[first : first + 2, columns] = G[knot]
-                qp.matrix[first + 2 : first + self._knot_rows, columns] = P[knot]
-                qp.matrix[row : row + 4, columns] = cone
-                qp.matrix[row + 4, columns] = patch.normal
-                qp.matrix[row + 4, forces + i] = -patch.force_cap
-                qp.lower[row : row + 5], qp.upper[row : row + 5] = -np.inf, 0.0
-                row += 5
-        qp.matrix[row, forces:] = 1.0
-        qp.lower[row] = qp.upper[row] = 1.0
-        solution = self._workspace.solve()
-        if solution.status != SolveStatus.SOLVED:
-            return Choice(-1, np.zeros((len(patches), self.KNOTS, 3)), np.inf, solution)
-        x = solution.x
-        return Choice(
-            winner=int(np.argmax(x[forces : forces + len(patches)])),
-            forces=x[:forces].reshape(slots, self.KNOTS, 3)[: len(patches)].copy(),
-            objective=0.5 * float(x @ qp.hessian @ x) + float(qp.gradient @ x),
-            solution=solution,
-        )
 
 
 class ContactForce:

@@ -6,17 +6,18 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.planner.candidates import Candidates
+from wbmpc.planner.candidates import COM_COST, Candidates
+from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
+from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
-from wbmpc.planner.zmp_model import need_at_rest
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import GRAVITY, SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
+from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
 
-RETRY_PLANS = 10  # plans between two firings of stage 3 when no candidate can help
+RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
 NOT_RUN = StageReport(SolveStatus.NOT_RUN, 0.0, 0)
 
@@ -42,18 +43,24 @@ class Contacts:
         self._force_stage = ContactForce(
             len(times), contact, mass=robot.mass, contacts=len(SIDES), backend=settings.qp_backend
         )
+        self._together = Posture(robot, nominal=nominal, com_cost=COM_COST)
         self.forces = np.zeros((len(SIDES), len(times), 3))  # [N] planned, in world
-        self._needed, self._quiet = False, True
+        self._needed, self._quiet = False, True  # of the shift as a whole
+        self._short = False  # the contacts there are cannot give it
+        self._spare: int | None = None  # side of the contact that the other hand's can do without
         self._hopeless = 0.0  # [s] that no candidate has been able to help
-        self._since_fired = RETRY_PLANS
+        self._since_review = RETRY_PLANS
 
     # ------------------------------------------------------------------ what others may ask
 
     @property
     def gate_open(self) -> bool:
-        """Whether tasks may go on: no contact is needed, or it carries its load, or none can help."""
+        """Whether tasks may go on: no contact is needed, or all that are expected carry load, or none can help."""
+        if not self._needed or not self.candidates.all:
+            return True
+        awaited = any(c.busy and c.expected for c in self.hands)
         carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self.hands)
-        return carried or not self._needed or self._hopeless >= GIVE_UP_TIME or not self.candidates.all
+        return (carried or self._hopeless >= GIVE_UP_TIME) and not awaited
 
     @property
     def points(self) -> list[Vector | None]:
@@ -65,12 +72,31 @@ class Contacts:
         patch = self.hands[side].patch
         return patch.name if patch else ""
 
-    def approach_com(self, side: int) -> Vector:
-        """CoM (3,) [m] of the posture that has this hand on its patch."""
-        contact = self.hands[side]
-        return next(c for c in self.candidates.all if c.patch is contact.patch and c.hand == side).posture.com
+    @property
+    def posture(self) -> Posture | None:
+        """The posture that has every hand with a contact on its patch and the CoM over the feet; None without one."""
+        placed = [c for c in self.hands if c.goal is not None]
+        if len(placed) == 1:
+            return next(
+                c for c in self.candidates.all if c.patch is placed[0].patch and c.hand == placed[0].side
+            ).posture
+        return self._together if placed else None
 
     # ------------------------------------------------------------------ one plan
+
+    def improve_postures(
+        self, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int, everyone: bool = False
+    ) -> None:
+        """Iterate the next candidate's posture (or everyone's) and the one with both hands on their patches.
+
+        Args:
+            soles, yaws: of the feet, (2, 3) [m] and (2,) [rad].
+            centre: (2,) where the CoM should rather be [m].
+        """
+        self.candidates.refresh(soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone)
+        palms = [c.goal for c in self.hands]
+        if all(palm is not None for palm in palms):
+            self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     def advance(self, dt: float, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
         """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N]."""
@@ -81,8 +107,8 @@ class Contacts:
                 palm=palms[side],
                 force=palm_forces[side],
                 wanted_force=float(self.forces[side, 0] @ contact.patch.normal) if contact.patch else 0.0,
-                needed=self._needed,
-                quiet=self._quiet,
+                needed=self._needed and side != self._spare,
+                quiet=self._quiet or side == self._spare,
                 home=homes[side],
             )
             if outcome == "failed":
@@ -98,16 +124,18 @@ class Contacts:
         self,
         need: Need,
         *,
-        goal: Vector | None,
+        goal: Need | None,
+        binding: bool,
         palms: Vector,
         hand_taken: list[bool],
         polygon: SupportPolygon,
         events: list[str],
     ) -> tuple[tuple[CandidateReport, ...], StageReport]:
-        """Judge the need, choose a contact when one is missing, and plan the forces of those that touch.
+        """Judge the need, choose contacts when those there are do not do, and plan the forces of those that touch.
 
         Args:
-            goal: CoM (3,) where the running task ends, beyond the horizon [m]; None without such a task.
+            goal: the need, of one knot, where the running task ends, maybe beyond the horizon; None without a task.
+            binding: whether there is no way back before that end (a foot in the air): it is waited for from the start.
             palms: (2, 3) measured [m].
             hand_taken: hands that a task uses.
             polygon: where the CoM may be before a contact carries load.
@@ -116,53 +144,80 @@ class Contacts:
             A report on every candidate when stage 3 fired (else empty), and stage 3's own report.
         """
         shift = float(np.abs(need.delta_z).max())
+        if binding and goal is not None:
+            shift = max(shift, float(np.abs(goal.delta_z).max()))
         self._needed = shift > self._settings.need_threshold
         self._quiet = shift < self._settings.quiet_threshold
-        self._since_fired += 1
+        self._since_review += 1
         reports: tuple[CandidateReport, ...] = ()
         stage = NOT_RUN
-        if self.candidates.all and not any(c.busy and c.phase != ContactPhase.RELEASED for c in self.hands):
-            free = [not c.busy and not taken for c, taken in zip(self.hands, hand_taken, strict=True)]
-            if not self._needed:
-                self._hopeless = 0.0
-            elif self._since_fired >= RETRY_PLANS and any(free) and self._hopeless < GIVE_UP_TIME:
-                reports, stage = self._fire(need, goal, palms=palms, free=free, polygon=polygon, events=events)
-            if self._needed and not any(c.phase == ContactPhase.CHOSEN for c in self.hands):
+        free = [not c.busy and not taken for c, taken in zip(self.hands, hand_taken, strict=True)]
+        if not self._needed:
+            self._hopeless, self._spare, self._short = 0.0, None, False
+        elif self.candidates.all:
+            if self._since_review >= RETRY_PLANS and (any(free) or len(self._committed) > 1):
+                self._since_review = 0
+                knots = self._worst_knots(need, goal)
+                self._review(knots)
+                if self._short and any(free) and self._hopeless < GIVE_UP_TIME:
+                    reports, stage = self._fire(knots, palms=palms, free=free, polygon=polygon, events=events)
+            if not self._committed:
                 self._hopeless += self._period
-            for contact in self.hands:
-                contact.need(self._needed and free[contact.side] and self._hopeless < GIVE_UP_TIME)
+        for contact in self.hands:
+            contact.need(self._short and free[contact.side] and self._hopeless < GIVE_UP_TIME)
         force_stage = self._plan_forces(need)
         return reports, force_stage if stage is NOT_RUN else stage
 
-    def _fire(
-        self,
-        need: Need,
-        goal: Vector | None,
-        *,
-        palms: Vector,
-        free: list[bool],
-        polygon: SupportPolygon,
-        events: list[str],
-    ) -> tuple[tuple[CandidateReport, ...], StageReport]:
-        """Stage 3's choice, on two knots: the largest shift in the horizon, and the task's end or the largest sideways.
+    @property
+    def _committed(self) -> list[HandContact]:
+        """The contacts that are there or on their way, those that are being released left out."""
+        leaving = (ContactPhase.UNLOADED, ContactPhase.RELEASED)
+        return [c for c in self.hands if c.busy and c.phase not in leaving]
+
+    def _worst_knots(self, need: Need, goal: Need | None) -> Need:
+        """Two knots to choose for: the largest shift in the horizon, and the task's end or the largest sideways.
 
         At the first sign of need the horizon shows a few millimetres; the contact must also do for where this leads.
         """
-        self._since_fired = 0
         sizes = np.abs(need.delta_z)
         worst = int(np.argmax(sizes.max(axis=1)))
-        mass = float(need.weight[worst]) / GRAVITY
-        final = None if goal is None else need_at_rest(goal, polygon=polygon, mass=mass)
-        if final is not None and np.abs(final.delta_z).max() > self._settings.need_threshold:
-            knots = need.pick([worst]).followed_by(final)
-        else:
-            knots = need.pick([worst, int(np.argmax(sizes[:, 1]))])
-        winner, reports, stage = self.candidates.choose(knots, palms=palms, free_hands=free, polygon=polygon)
-        answer = f"chose {winner.patch.name} for the {SIDES[winner.hand]} hand" if winner else "no candidate helps"
-        events.append(f"stage 3 fired: |ΔZ| {1e3 * sizes.max():.1f} mm at knot {worst + 1}, {answer}")
-        if winner:
+        if goal is not None and np.abs(goal.delta_z).max() > self._settings.need_threshold:
+            return need.pick([worst]).followed_by(goal)
+        return need.pick([worst, int(np.argmax(sizes[:, 1]))])
+
+    def _review(self, knots: Need) -> None:
+        """Whether the committed contacts fall short of the need, and which of two the other can do without.
+
+        One contact joins, or leaves, when the feet's pressure under the others' forces, caps and cones included, would
+        be outside its polygon, or inside, by the threshold: the same problem as the choice, with H given.
+        """
+        threshold, committed = self._settings.need_threshold, self._committed
+        held = _options(committed)
+        self._short = not np.isfinite(self.candidates.carry(knots.inset(-threshold), held))
+        self._spare = None
+        if len(committed) > 1 and not self._short:
+            alone = [self.candidates.carry(knots.inset(threshold), [option]) for option in held]
+            best = int(np.argmin(alone))
+            if np.isfinite(alone[best]):
+                self._spare = committed[1 - best].side
+
+    def _fire(
+        self, knots: Need, *, palms: Vector, free: list[bool], polygon: SupportPolygon, events: list[str]
+    ) -> tuple[tuple[CandidateReport, ...], StageReport]:
+        """Stage 3's choice of what joins the committed contacts."""
+        held = _options(self._committed)
+        winners, reports, stage = self.candidates.choose(
+            knots, palms=palms, free_hands=free, held=held, polygon=polygon
+        )
+        chosen = " and ".join(f"{w.patch.name} for the {SIDES[w.hand]} hand" for w in winners)
+        size = 1e3 * np.abs(knots.delta_z[0]).max()
+        beside = f" beside {' and '.join(option.patch.name for option in held)}" if held else ""
+        events.append(
+            f"stage 3 fired: |ΔZ| {size:.1f} mm{beside}, {f'chose {chosen}' if chosen else 'no candidate helps'}"
+        )
+        for winner in winners:
             self.hands[winner.hand].choose(winner.patch, palm=palms[winner.hand])
-            self._hopeless = 0.0
+            self._hopeless, self._short = 0.0, False
         return reports, stage
 
     def _plan_forces(self, need: Need) -> StageReport:
@@ -176,3 +231,8 @@ class Contacts:
         if forces is not None:
             self.forces = forces
         return StageReport(solution.status, perf_counter() - begin, solution.iterations)
+
+
+def _options(contacts: list[HandContact]) -> list[Option]:
+    """Contacts as stage 3 knows them: their prices are paid."""
+    return [Option(c.patch, c.side, held=True) for c in contacts if c.patch is not None]

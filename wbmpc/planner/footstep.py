@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from wbmpc.signals import Vector
 
 
@@ -18,8 +20,13 @@ class Footstep:
     double_support: float  # [s] before the foot is lifted, when it follows another step
     clearance: float  # [m] how high the foot is lifted
     lead: float  # share of the swing in which the foot only rises, and at its end only sinks: 0 … 0.4
-    adaptable: bool  # whether stage 2 may move it
+    adaptable: bool  # a walking step: stage 2 may move it, its swing does not wait for the CoM
     task: int  # index of the task that asks for it
+
+    def share(self, sigma: Vector) -> Vector:
+        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time; minimum jerk between leads."""
+        phase = np.clip((sigma - self.lead) / (1.0 - 2.0 * self.lead), 0.0, 1.0)
+        return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
 
 
 @dataclass(frozen=True, slots=True)

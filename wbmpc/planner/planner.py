@@ -8,10 +8,12 @@ from time import perf_counter
 import numpy as np
 
 from wbmpc.kinematics import Kinematics
-from wbmpc.planner.bands import height_band, horizontal_band
+from wbmpc.planner.bands import height_band
 from wbmpc.planner.com_height import ComHeightStage, HeightPlan
 from wbmpc.planner.com_state import ComState
+from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
+from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import SoleReferences
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
@@ -22,11 +24,11 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
-from wbmpc.planner.zmp_model import free_model, loaded_model, need_of
+from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.rotations import heading_of
-from wbmpc.scenario import PatchPose, Task
+from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
@@ -51,6 +53,7 @@ class Planner:
         *,
         tasks: tuple[Task, ...],
         patches: tuple[PatchPose, ...],
+        obstacles: tuple[Obstacle, ...] = (),
         q: Vector,
         period: float,
     ) -> None:
@@ -64,18 +67,17 @@ class Planner:
         )
         measured = self._measured = Kinematics(robot)
         measured.update_kinematics(q)
-        self._gait = Gait(
-            settings.gait, Stepping(tasks, settings.gait), soles=self._measured_soles(), yaws=self._measured_yaws()
-        )
+        stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
+        self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._palms = np.array([measured.position(f) for f in robot.palm_frames])
-        self._palm_homes = self._palms.copy()
+        self._palm_homes = self._in_torso(self._palms)  # where free hands hang
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
         self._references = References(robot, tasks, q=q, palms=self._palms, height=float(measured.com[2]), times=times)
         self._joints = JointReference(robot, settings.whole_body, q=q)
-        self._improve_postures(self._supports(0.0)[0].polygons[0].centre, iterations=FIRST_ITERATIONS, everyone=True)
+        self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
         self._time, self._elapsed = (
             0.0,
@@ -94,38 +96,43 @@ class Planner:
         plane = polygon.plane_height
         mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
 
-        full_pace, _ = references.palms(state.time, contacts, full_pace=True)
-        gated, sigma = references.palms(state.time, contacts, full_pace=False)
+        stride, times = self._gait.stride, preview.times
+        full_pace, full_sigma = references.palms(state.time, contacts, pace=1.0)
+        gated, sigma = references.palms(state.time, contacts)
+        foot, gated_foot = np.zeros(preview.steps), np.zeros(preview.steps)
+        if stride is not None:
+            foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        height, solution = self._plan_height(references.wanted_height(state.time, sigma), band, plane)
+        height, solution = self._plan_height(
+            references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane
+        )
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._palms)
-        reach_distance = references.reach_distance(contacts)
         soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
             hands=hands,
-            posture=references.posture(),
-            torso_up=references.torso_up(),
-            torso_heading=references.torso_heading(float(soles.yaws.mean())),
+            torso_up=references.torso_up(contacts),
+            posture=references.posture(contacts),
+            torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
         )
         # a robot that steps is not to stop, its coming steps catch it
         alarm = self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
         urgency = 1.0 + alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, reach: Vector
+            stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, com_band: Vector
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
                 self._com.value[:2],
                 zmp=zmp,
                 support=support,
-                com_band=horizontal_band(reach, reach_distance),
+                com_band=com_band,
                 tasks=tasks,
                 velocity_time=self._period,
                 urgency=urgency,
@@ -136,12 +143,15 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(self._need_stage, model, at_once, full_pace)
+            wish, _ = stage_2(
+                self._need_stage, model, at_once, references.com_band(contacts, full_pace, full_sigma, foot)
+            )
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
                     need_of(wish, height, model, polygons=at_once.polygons, mass=mass, exact=exact),
-                    goal=references.goal_com,
+                    goal=self._goal_need(mass),
+                    binding=stride is not None,
                     palms=self._palms,
                     hand_taken=references.hands_taken(),
                     polygon=polygon,
@@ -150,7 +160,9 @@ class Planner:
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(self._motion_stage, model, gated_support, gated)
+        motion, solution = stage_2(
+            self._motion_stage, model, gated_support, references.com_band(contacts, gated, sigma, gated_foot)
+        )
         stage2 = _stage_report(solution, begin)
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
@@ -193,6 +205,14 @@ class Planner:
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
 
+    def _in_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return (points - self._measured.position(frame)) @ self._measured.rotation(frame)
+
+    def _from_torso(self, points: Vector) -> Vector:
+        frame = self._robot.torso_frame
+        return self._measured.position(frame) + points @ self._measured.rotation(frame).T
+
     def _measured_soles(self) -> Vector:
         return np.array([self._measured.position(f) for f in self._robot.sole_frames])
 
@@ -215,23 +235,43 @@ class Planner:
             loads=state.sole_wrench_in_world[:, 2],
             events=events,
         )
-        references.advance(state.time, dt, gate_open=gate_open, palms=self._palms, events=events)
+        references.advance(
+            state.time, dt, gate_open=gate_open, palms=self._palms, com=self._measured.com, events=events
+        )
         contacts.advance(
             dt,
             palms=self._palms,
             palm_forces=state.palm_force_in_world,
-            homes=self._palm_homes,
+            homes=self._from_torso(self._palm_homes),
             events=events,
         )
-        self._improve_postures(self._gait.feet.positions[:, :2].mean(axis=0), iterations=2)
+        self._improve_postures(iterations=2)
 
-    def _improve_postures(self, centre: Vector, *, iterations: int, everyone: bool = False) -> None:
-        """Iterate the reach's posture and the next candidate's (or everyone's); `centre` (2,) is the support's [m]."""
-        soles, yaws = self._gait.feet.positions, self._gait.feet.yaws
-        self._references.update_goal(self._contacts, soles=soles, yaws=yaws, centre=centre, iterations=iterations)
-        self._contacts.candidates.refresh(
-            soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone
+    def _improve_postures(self, *, iterations: int, everyone: bool = False) -> None:
+        """Iterate the tasks' postures and the next candidate's (or everyone's)."""
+        feet, stride = self._gait.feet, self._gait.stride
+        centre = feet.positions[:, :2].mean(axis=0) if stride is None else stride.stance_centre
+        if stride is not None or self._gait.phase == SupportPhase.STAND:  # walking keeps the standing posture
+            self._references.update_postures(
+                self._contacts,
+                soles=feet.positions,
+                yaws=feet.yaws,
+                stride=stride,
+                centre=centre,
+                iterations=iterations,
+            )
+        self._contacts.improve_postures(
+            soles=feet.positions, yaws=feet.yaws, centre=centre, iterations=iterations, everyone=everyone
         )
+
+    def _goal_need(self, mass: float) -> Need | None:
+        """The need where the current task ends, on the feet that will carry it; None without such a task."""
+        com = self._references.goal_com
+        if com is None:
+            return None
+        margin = self._settings.whole_body.zmp_margin
+        polygon = self._gait.goal_polygon(half_extents=self._robot.sole_half_extents, margin=margin)
+        return need_at_rest(com, polygon=polygon, mass=mass)
 
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
         """Support at full pace and at the gate's, its inset smaller the louder the alarm."""

@@ -1,26 +1,33 @@
-"""What the tasks ask over the horizon: palm paths, CoM heights, and the posture that a reach needs."""
+"""What the tasks ask over the horizon: palm paths, CoM paths and heights, and the posture that a task needs."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from wbmpc.planner.bands import horizontal_band
 from wbmpc.planner.contacts import Contacts
+from wbmpc.planner.lean import Lean
 from wbmpc.planner.posture import Posture
-from wbmpc.planner.reach import Reach, ReachPhase
+from wbmpc.planner.progress import TaskPhase
+from wbmpc.planner.reach import Reach
+from wbmpc.planner.stride import Stride
 from wbmpc.robot import Robot
-from wbmpc.scenario import ComHeightTask, ReachTask, Task
+from wbmpc.rotations import angle_difference
+from wbmpc.scenario import ComHeightTask, LeanTask, ReachTask, Task
 from wbmpc.signals import SIDES, HandMode, Vector
 
-REACH_FLOOR = 0.12  # [m] smallest d: a hand never pins the CoM to itself
+REACH_FLOOR, FOOT_FLOOR = 0.12, 0.05  # [m] smallest d of hand and foot: neither pins the CoM to itself
 UNBOUNDED = 0.3  # [m] d of a hand without a reference
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
+LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
+LEAN_BAND = 0.001  # [m] d of the CoM from a lean's way
 SHRINK_RATE, SHRINK_LIMIT = 1.0, 0.02  # [1/s], [m] how a held hand that stays short tightens its d
 
 
 class References:
     """Tasks and contacts as references of the stages, at the tasks' own pace or at full pace.
 
-    The *gated* references go on at each reach's present rate: that is what gets executed. The ones at *full pace* show
+    The *gated* references go on at each task's present rate: that is what gets executed. The ones at *full pace* show
     what the task would need if nothing held it up: that is what the need for a contact is judged by.
     """
 
@@ -28,104 +35,202 @@ class References:
         self, robot: Robot, tasks: tuple[Task, ...], *, q: Vector, palms: Vector, height: float, times: Vector
     ) -> None:
         """Start with palms at `palms` (2, 3) [m] and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
-        self._times, self._nominal, self._nominal_height = times, q, height
+        self._times, self._nominal_height = times, height
         self.reaches = [
             Reach(task, side=_hand_of(task, palms), palm=palms[_hand_of(task, palms)])
             for task in tasks
             if isinstance(task, ReachTask)
         ]
+        self.leans = [Lean(task) for task in tasks if isinstance(task, LeanTask)]
+        self._tasks: list[Reach | Lean] = [*self.reaches, *self.leans]
         self._heights = [task for task in tasks if isinstance(task, ComHeightTask)]
-        self._goal = Posture(robot, nominal=q, com_cost=COM_COST)
+        self._stand = Posture(robot, nominal=q, com_cost=COM_COST)
+        self._reach_goal = Posture(robot, nominal=q, com_cost=COM_COST)
+        self._stride: Stride | None = None
+        self._lean_goal = Posture(robot, nominal=q, com_cost=LEAN_COST)
+        self._centre = np.zeros(2)  # [m] between the feet
         self._shrink = 0.0  # [m] taken off d
 
     # ------------------------------------------------------------------ once a plan
 
-    def advance(self, time: float, dt: float, *, gate_open: bool, palms: Vector, events: list[str]) -> None:
-        """Every task one plan further; `palms` (2, 3) are measured [m]."""
-        for reach in self.reaches:
-            before, palm = reach.phase, palms[reach.side]
-            reach.advance(time, dt, gate_open=gate_open, palm=palm)
-            if reach.phase != before:
-                events.append(f"reach {SIDES[reach.side]}: {before.name.lower()} -> {reach.phase.name.lower()}")
-            if reach.phase == ReachPhase.HOLD:
-                short = float(np.linalg.norm(palm - reach.target)) - 0.5 * reach.task.tolerance
-                self._shrink = min(max(self._shrink + SHRINK_RATE * dt * short, 0.0), SHRINK_LIMIT)
+    def advance(
+        self, time: float, dt: float, *, gate_open: bool, palms: Vector, com: Vector, events: list[str]
+    ) -> None:
+        """Every task one plan further; `palms` (2, 3) and `com` (3,) are measured [m]."""
+        for task in self._tasks:
+            before = task.progress.phase
+            if isinstance(task, Reach):
+                name, palm = f"reach {SIDES[task.side]}", palms[task.side]
+                task.advance(time, dt, gate_open=gate_open, palm=palm)
+                if task.progress.phase == TaskPhase.HOLD:
+                    short = float(np.linalg.norm(palm - task.target)) - 0.5 * task.task.tolerance
+                    self._shrink = min(max(self._shrink + SHRINK_RATE * dt * short, 0.0), SHRINK_LIMIT)
+            else:
+                name = "lean"
+                task.advance(time, dt, gate_open=gate_open, com=com)
+            if task.progress.phase != before:
+                events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
 
-    def update_goal(self, contacts: Contacts, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int) -> None:
-        """Improve the posture with the palm at the reach's target and the bracing palm on its patch."""
+    def update_postures(
+        self,
+        contacts: Contacts,
+        *,
+        soles: Vector,
+        yaws: Vector,
+        stride: Stride | None,
+        centre: Vector,
+        iterations: int,
+    ) -> None:
+        """Improve the postures: standing on the feet as they are, and the one in which the current task ends.
+
+        In the latter palm, foot or CoM are at the task's target and the bracing palms on their patches.
+        """
+        self._centre = centre
+        if self._stride is not None and stride is None:  # landed: stand on from there
+            self._stand.q = self._reach_goal.q.copy()
+        self._stride = stride
+        self._stand.iterate(iterations, soles=soles, yaws=yaws, palms=[None, None], centre=centre)
+        if stride is not None:
+            soles, yaws = stride.after.positions, stride.after.yaws
         palms: list[Vector | None] = [c.goal for c in contacts.hands]
-        for reach in self.reaches:
-            if reach.phase != ReachPhase.DONE:
-                palms[reach.side] = reach.target
-        if any(palm is not None for palm in palms):
+        for task in self._current:
+            if isinstance(task, Lean):
+                centre = task.target
+            else:
+                palms[task.side] = task.target
+        if stride is not None or self._leaning is not None or any(palm is not None for palm in palms):
             self._goal.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
+
+    @property
+    def _current(self) -> list[Reach] | list[Lean]:
+        """The reaches still to be done, or the lean that comes before them."""
+        reaches = [reach for reach in self.reaches if reach.progress.phase != TaskPhase.DONE]
+        leans = [lean for lean in self.leans if lean.progress.phase != TaskPhase.DONE]
+        first = min(leans, key=lambda lean: lean.task.start, default=None)
+        if first is None or any(reach.task.start < first.task.start for reach in reaches):
+            return reaches
+        return [first]
+
+    @property
+    def _leaning(self) -> Lean | None:
+        """The lean that is current, if one is."""
+        return next((task for task in self._current if isinstance(task, Lean)), None)
+
+    @property
+    def _goal(self) -> Posture:
+        return self._lean_goal if self._leaning is not None else self._reach_goal
 
     # ------------------------------------------------------------------ over the horizon
 
-    def palms(self, time: float, contacts: Contacts, *, full_pace: bool) -> tuple[Vector, Vector]:
-        """Palm references (2, N, 3) [m], nan for a free hand, and the furthest reach's σ (N,)."""
+    def palms(self, time: float, contacts: Contacts, *, pace: float | None = None) -> tuple[Vector, Vector]:
+        """Palm references (2, N, 3) [m], nan for a free hand, and the furthest task's σ (N,).
+
+        `pace`: of all tasks' clocks, 0 … 1; None: each at its own gate's.
+        """
         times = self._times
         references = np.full((len(SIDES), len(times), 3), np.nan)
         sigma = np.zeros(len(times))
         for contact in contacts.hands:
             if contact.goal is not None:
                 references[contact.side] = contact.preview(times)
-        for reach in self.reaches:
-            if reach.phase != ReachPhase.DONE:
-                rate = 1.0 if full_pace else reach.rate
-                references[reach.side] = reach.preview(time, times, rate=rate)
-                sigma = np.maximum(sigma, reach.sigmas(time, times, rate=rate))
+        for task in self._current:
+            sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
+            sigma = np.maximum(sigma, sigmas)
+            if isinstance(task, Reach):
+                references[task.side] = task.preview(sigmas)
         return references, sigma
 
-    def wanted_height(self, time: float, sigma: Vector) -> Vector:
-        """CoM height (N,) to stay near [m]: a height task's profile, else the reach's posture by its progress."""
-        wanted = np.full(len(self._times), self._nominal_height)
-        if self.reaches:
-            wanted += sigma * (self._goal.com[2] - self._nominal_height)
+    def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector, foot: Vector) -> Vector:
+        """Where the horizontal CoM may be (2, N, 2) [m]: within d of palms and foot, near a lean's way; see `bands`.
+
+        Args:
+            palms, sigma: what `palms` answered, (2, N, 3) [m] and (N,).
+            foot: shares (N,) of a stride's way; without a stride not looked at.
+        """
+        places, distance = palms[:, :, :2], np.tile(self._reach_distance(contacts)[:, None], (1, len(foot), 1))
+        if self._stride is not None:
+            places = np.concatenate([places, self._stride.positions(foot)[None]])
+            distance = np.concatenate([distance, self._foot_distance(contacts, foot)[None]])
+        band = horizontal_band(places, distance)
+        lean = self._leaning
+        if lean is None:
+            return band
+        way = lean.preview(sigma, home=self._centre).T  # (2, N)
+        way = np.clip(way, band[:, :, 0], band[:, :, 1])  # hands first: what they touch is what lets the CoM go on
+        asked = lean.progress.active | (sigma > 0.0)  # before it starts nobody asks where the CoM is
+        return np.where(asked[:, None], way[:, :, None] + [-LEAN_BAND, LEAN_BAND], band)
+
+    def wanted_height(self, time: float, contacts: Contacts, sigma: Vector) -> Vector:
+        """CoM height (N,) to stay near [m]: a height task's profile, else that of the postures of contacts and task.
+
+        `sigma` (N,): the furthest task's or the stride's progress.
+        """
+        base = self._base(contacts).com[2]
+        wanted = np.full(len(self._times), base)
+        if self._current or self._stride is not None:
+            wanted += sigma * (self._goal.com[2] - base)
         for task in self._heights:
             knots = [0.0] + [w.time for w in task.waypoints]
             heights = [self._nominal_height] + [w.height for w in task.waypoints]
             wanted = np.interp(time + self._times, knots, heights)
         return wanted
 
-    def reach_distance(self, contacts: Contacts) -> Vector:
-        """d (2, 2) per hand and axis [m]: what lies between palm and CoM in the posture that the reach needs.
+    def _base(self, contacts: Contacts) -> Posture:
+        """What the robot does without a task: stand, or brace."""
+        return contacts.posture if contacts.posture is not None else self._stand
+
+    def _foot_distance(self, contacts: Contacts, share: Vector) -> Vector:
+        """d (N, 2) [m] of a stride's foot at `share` (N,) of its way, from the postures before and after."""
+        assert self._stride is not None
+        ends = self._stride.positions(np.array([0.0, 1.0]))
+        before = np.abs(ends[0] - self._base(contacts).com[:2])
+        after = np.abs(ends[1] - self._goal.com[:2])
+        return np.maximum(before + share[:, None] * (after - before), FOOT_FLOOR)
+
+    def _reach_distance(self, contacts: Contacts) -> Vector:
+        """d (2, 2) per hand and axis [m]: what lies between palm and CoM in the posture that the task needs.
 
         The paper takes d as a constant of the robot; the posture makes it the constant of this target and this stance.
         """
-        distance = np.full((len(SIDES), 2), UNBOUNDED)
+        distance, braced = np.full((len(SIDES), 2), UNBOUNDED), contacts.posture
         for contact in contacts.hands:
-            if contact.goal is not None:
-                distance[contact.side] = np.abs(contact.goal[:2] - contacts.approach_com(contact.side)[:2])
-                if self.reaches:
-                    with_reach = np.abs(contact.goal[:2] - self._goal.com[:2])
-                    distance[contact.side] = np.maximum(distance[contact.side], with_reach)
-        for reach in self.reaches:
-            if reach.phase != ReachPhase.DONE:
-                distance[reach.side] = np.abs(reach.target[:2] - self._goal.com[:2]) - self._shrink
+            if contact.goal is not None and braced is not None:
+                distance[contact.side] = np.abs(contact.goal[:2] - braced.com[:2])
+                if self._current or self._stride is not None:
+                    with_task = np.abs(contact.goal[:2] - self._goal.com[:2])
+                    distance[contact.side] = np.maximum(distance[contact.side], with_task)
+        for task in self._current:
+            if isinstance(task, Reach):
+                distance[task.side] = np.abs(task.target[:2] - self._goal.com[:2]) - self._shrink
         return np.maximum(distance, REACH_FLOOR)
 
     # ------------------------------------------------------------------ now
 
-    def posture(self) -> Vector:
-        """Joint angles (nj,) that the joint reference is drawn to: standing, or the reach's posture by its progress."""
-        sigma = max((r.sigma for r in self.reaches), default=0.0)
-        return self._nominal[7:] + sigma * (self._goal.q[7:] - self._nominal[7:])
+    def posture(self, contacts: Contacts) -> Vector:
+        """Joint angles (nj,) that the joint reference is drawn to: standing or braced, the task's by its progress."""
+        base = self._base(contacts).q
+        return base[7:] + self._sigma * (self._goal.q[7:] - base[7:])
 
-    def torso_up(self) -> Vector:
-        """Where the torso's own vertical should point (3,), in world: up, or as in the reach's posture."""
-        sigma = max((r.sigma for r in self.reaches), default=0.0)
-        up = np.array([0.0, 0.0, 1.0])
-        return up + sigma * (self._goal.torso_up - up) if sigma > 0.0 else up
+    def torso_up(self, contacts: Contacts) -> Vector:
+        """Where the torso's own vertical should point (3,), in world: as in those postures."""
+        base = self._base(contacts).torso_up
+        return base + self._sigma * (self._goal.torso_up - base)
 
-    def torso_heading(self, feet: float) -> float:
-        """Yaw of the torso [rad]: the feet's, `feet`, or as in the reach's posture."""
-        sigma = max((r.sigma for r in self.reaches), default=0.0)
-        return feet + sigma * (self._goal.torso_heading - feet)
+    @property
+    def _sigma(self) -> float:
+        """Progress of the furthest task or the stride."""
+        tasks = max((task.progress.sigma for task in self._current), default=0.0)
+        return tasks if self._stride is None else max(tasks, self._stride.sigma)
+
+    def torso_heading(self, contacts: Contacts, feet: float) -> float:
+        """Yaw of the torso [rad]: the feet's, `feet`, or as in those postures."""
+        braced = contacts.posture
+        base = feet if braced is None else feet + angle_difference(braced.torso_heading, feet)
+        return base + self._sigma * angle_difference(self._goal.torso_heading, base)
 
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
-        taken = [r.side for r in self.reaches if r.phase != ReachPhase.DONE]
+        taken = [task.side for task in self._current if isinstance(task, Reach)]
         return [side in taken for side in range(len(SIDES))]
 
     def hand_targets(self, contacts: Contacts, palms: Vector) -> list[tuple[Vector, Vector, HandMode]]:
@@ -137,21 +242,21 @@ class References:
             if contact.busy:
                 target = (*contact.reference()[:2], contact.mode)
             for reach in self.reaches:
-                if reach.side == side and reach.active:
+                if reach.side == side and reach.progress.active:
                     target = (*reach.reference()[:2], HandMode.MOVE)
             targets.append(target)
         return targets
 
     @property
     def goal_com(self) -> Vector | None:
-        """CoM (3,) [m] where the running reach ends; None when none is on its way or holding."""
-        running = any(r.phase in (ReachPhase.WAIT, ReachPhase.GO, ReachPhase.HOLD) for r in self.reaches)
-        return self._goal.com if running else None
+        """CoM (3,) [m] where the current task ends; None when none is on its way or holding."""
+        ahead = self._stride is not None or any(task.progress.ahead for task in self._current)
+        return self._goal.com if ahead else None
 
     @property
     def progress(self) -> float:
-        """Rate of the slowest reach's clock, 0 … 1."""
-        return min((r.rate for r in self.reaches), default=1.0)
+        """Rate of the slowest task's clock, 0 … 1."""
+        return min((task.progress.rate for task in self._tasks), default=1.0)
 
 
 def _hand_of(task: ReachTask, palms: Vector) -> int:

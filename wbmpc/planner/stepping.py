@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.settings import GaitSettings
-from wbmpc.scenario import StepTask, Task, WalkTask
+from wbmpc.scenario import GoTask, StepTask, Task, WalkTask
 from wbmpc.signals import Vector
 
 ALIGNED, ALIGNED_YAW = 0.02, 0.06  # [m], [rad] feet so close to side by side need no further step
 STILL = 1e-6  # [m/s, rad/s] a command below is to stand
 SIDE_SIGN = (1.0, -1.0)  # left is +y
+SEARCH_STEP = 0.005  # [m] between the places that are tried for a foot
 CAREFUL_LEAD = 0.3  # of a slow step: the foot rises, goes over, comes down
 
 
@@ -22,8 +24,9 @@ class Stepping:
     sideways or turning motion goes first and takes all of it, the other one closes up, so that legs never cross.
     """
 
-    def __init__(self, tasks: tuple[Task, ...], settings: GaitSettings) -> None:
-        self._settings = settings
+    def __init__(self, tasks: tuple[Task, ...], settings: GaitSettings, footholds: Footholds) -> None:
+        self._settings, self._footholds = settings, footholds
+        self._journeys = [(i, task) for i, task in enumerate(tasks) if isinstance(task, GoTask)]
         self._walks = [(i, task) for i, task in enumerate(tasks) if isinstance(task, WalkTask)]
         self._steps = [(i, task) for i, task in enumerate(tasks) if isinstance(task, StepTask)]
         self._done: set[int] = set()
@@ -47,6 +50,9 @@ class Stepping:
         for index, task in self._steps:
             if index not in self._done and index not in made and task.start <= time + 1e-9:
                 return self._commanded(index, task, feet)
+        for index, journey in self._journeys:
+            if journey.start <= time + 1e-9:
+                return self._towards(index, journey, feet)
         command = self.command(time)
         return None if command is None else self._walk(feet, command)
 
@@ -69,6 +75,60 @@ class Stepping:
             adaptable=False,
             task=index,
         )
+
+    def _towards(self, index: int, task: GoTask, feet: Feet) -> Footstep | None:
+        """The next step to a place: the nearest free foothold ahead, beyond an obstacle when there is none before it.
+
+        The foot that goes over an obstacle goes no further than it must, and the other one closes up behind it: the
+        shorter the stride, the less the hands have to help.
+        """
+        settings = self._settings
+        yaw = _heading(feet)
+        turn = _rotation(yaw)
+        rest = turn.T @ (np.array(task.target) - feet.positions[:, :2].mean(axis=0))
+        if float(np.abs(rest).max()) < ALIGNED and _aligned(feet):
+            return None
+        side = (0 if rest[1] >= 0.0 else 1) if feet.last < 0 else 1 - feet.last
+        stance, start = feet.positions[1 - side][:2], feet.positions[side][:2]
+        across = SIDE_SIGN[side] * settings.step_width
+        goal = turn.T @ (np.array(task.target) - stance) + [0.0, across / 2]
+        wanted = np.array([np.clip(goal[0], -task.step_length, task.step_length), across])
+        outwards = sorted((0.0, SIDE_SIGN[side] * task.step_length))
+        wanted[1] += min(max(goal[1] - across, outwards[0]), outwards[1])
+        forward = 1.0 if rest[0] >= 0.0 else -1.0
+        way = task.longest_step * forward
+
+        def place(ahead: float) -> Vector:
+            return stance + turn @ np.array([ahead, wanted[1]])
+
+        nominal = self._footholds.crossed(start, place(wanted[0]), yaw)
+        if nominal == 0.0 and self._footholds.free(place(wanted[0]), yaw):
+            ahead = wanted[0]
+        else:  # something is in the way: the first place beyond it, or the last one before
+            tries = np.arange(0.0, abs(way) + 1e-9, SEARCH_STEP) * forward
+            beyond = [a for a in tries if self._over(start, place(a), yaw) and self._footholds.free(place(a), yaw)]
+            before = [a for a in tries if self._footholds.crossed(start, place(a), yaw) == 0.0]
+            if not beyond and not before:
+                return None
+            ahead = beyond[0] if beyond else before[-1]
+            if not beyond and abs((turn.T @ (place(ahead) - start))[0]) < SEARCH_STEP and _aligned(feet):
+                return None  # no way on from here
+        height = self._footholds.crossed(start, place(ahead), yaw) or 0.0
+        return Footstep(
+            side=side,
+            position=np.array([*place(ahead), feet.positions[1 - side][2]]),
+            yaw=yaw,
+            swing_time=task.swing_time,
+            double_support=settings.first_double_support,
+            clearance=max(settings.step_height, height),
+            lead=CAREFUL_LEAD,
+            adaptable=False,
+            task=index,
+        )
+
+    def _over(self, start: Vector, end: Vector, yaw: float) -> bool:
+        height = self._footholds.crossed(start, end, yaw)
+        return height is not None and height > 0.0
 
     def _walk(self, feet: Feet, command: Vector) -> Footstep | None:
         settings = self._settings
@@ -96,7 +156,7 @@ class Stepping:
             double_support=settings.double_support,
             clearance=settings.step_height,
             lead=0.06,
-            adaptable=settings.adapt_footsteps,
+            adaptable=True,
             task=self._walks[0][0],
         )
 

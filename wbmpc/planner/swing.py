@@ -60,13 +60,6 @@ class Swing:
         v[2] -= self._sinking
         return p, v, a
 
-    def positions(self, sigmas: Vector) -> Vector:
-        """Horizontal sole positions (n, 2) [m] at `sigmas` (n,)."""
-        lead = self.step.lead
-        phase = np.clip((sigmas - lead) / (1.0 - 2.0 * lead), 0.0, 1.0)
-        s = phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
-        return self.start[:2] + s[:, None] * (self.target - self.start)[:2]
-
     def heading(self, rate: float) -> tuple[float, float]:
         """Yaw [rad] and its rate [rad/s] now, σ growing at `rate` [1/s]."""
         lead = self.step.lead

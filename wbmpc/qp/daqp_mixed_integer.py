@@ -25,7 +25,7 @@ class DaqpMixedInteger:
 
     Soft rows become slack variables: with its own soft rows, daqp 0.11 now and then calls a fractional point of an
     infeasible problem optimal. It bounds the iterations of each node but offers no limit on nodes; with a row
-    Σ x_j = 1 over K binaries the tree has at most about 2 K nodes.
+    Σ x_j ≤ s over K binaries the tree has of the order of K^s nodes.
     """
 
     def __init__(self, problem: QuadraticProgram) -> None:

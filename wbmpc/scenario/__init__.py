@@ -3,6 +3,7 @@
 from wbmpc.scenario.consistency import check_names
 from wbmpc.scenario.json_schema import scenario_json_schema
 from wbmpc.scenario.load import counterfactual, load_scenario, robot_path, vary
+from wbmpc.scenario.obstacles import Obstacle, resolve_obstacles
 from wbmpc.scenario.overrides import apply_overrides, parse_overrides
 from wbmpc.scenario.patches import PatchPose, resolve_patches
 from wbmpc.scenario.schema.experiments import Counterfactual, Sweep, Variation
@@ -11,8 +12,10 @@ from wbmpc.scenario.schema.plant import Disturbance, Impulse, PlantSettings, Sen
 from wbmpc.scenario.schema.scenario import Scenario
 from wbmpc.scenario.schema.tasks import (
     ComHeightTask,
+    ExcursionTask,
     GoTask,
     HeightWaypoint,
+    LeanTask,
     ReachTask,
     StandTask,
     StepTask,
@@ -28,12 +31,15 @@ __all__ = [
     "ComHeightTask",
     "Counterfactual",
     "Disturbance",
+    "ExcursionTask",
     "Floor",
     "GoTask",
     "HeightWaypoint",
     "Impulse",
     "InitialState",
+    "LeanTask",
     "LoopSettings",
+    "Obstacle",
     "Patch",
     "PatchPose",
     "PlantSettings",
@@ -55,6 +61,7 @@ __all__ = [
     "counterfactual",
     "load_scenario",
     "parse_overrides",
+    "resolve_obstacles",
     "resolve_patches",
     "robot_path",
     "scenario_json_schema",

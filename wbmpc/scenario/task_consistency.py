@@ -8,7 +8,15 @@ from collections.abc import Iterable, Iterator
 
 from wbmpc.scenario.diagnosis import Finding
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import ComHeightTask, FootworkTask, GoTask, ReachTask, Task, WalkTask
+from wbmpc.scenario.schema.tasks import (
+    ComHeightTask,
+    ExcursionTask,
+    FootworkTask,
+    GoTask,
+    LeanTask,
+    Task,
+    WalkTask,
+)
 from wbmpc.scenario.wording import KeyPath
 
 
@@ -23,10 +31,11 @@ def find_task_inconsistencies(scenario: Scenario) -> Iterator[Finding]:
     if len(heights) > 1:
         yield Finding(("tasks", heights[1]), f"a second com_height task, first is tasks.{heights[0]}")
     yield from _footwork(scenario.tasks)
+    yield from _leans(scenario.tasks)
 
 
 def _inside_one_task(path: KeyPath, task: Task) -> Iterator[Finding]:
-    if isinstance(task, ReachTask) and task.arrive_by <= task.start:
+    if isinstance(task, ExcursionTask) and task.arrive_by <= task.start:
         message = f"must be later than start ({task.start:g} s), got {task.arrive_by:g} s"
         yield Finding((*path, "arrive_by"), message)
     elif isinstance(task, ComHeightTask):
@@ -43,6 +52,16 @@ def _in_order(path: KeyPath, times: list[float], what: str) -> Iterator[Finding]
         if after <= before:
             message = f"must be later than the {what} before it ({before:g} s), got {after:g} s"
             yield Finding((*path, index, "time"), message)
+
+
+def _leans(tasks: Iterable[Task]) -> Iterator[Finding]:
+    """The CoM goes to one target at a time: a lean shares its time with no reach and no other lean."""
+    busy = [(index, task) for index, task in enumerate(tasks) if isinstance(task, ExcursionTask)]
+    busy.sort(key=lambda entry: entry[1].start)
+    for (first, before), (index, task) in itertools.combinations(busy, 2):
+        if task.start < before.end and LeanTask in (type(before), type(task)):
+            message = f"begins at {task.start:g} s, but tasks.{first} ({before.kind}) lasts until {before.end:g} s"
+            yield Finding(("tasks", index), message)
 
 
 def _footwork(tasks: Iterable[Task]) -> Iterator[Finding]:

@@ -21,6 +21,9 @@ class NoFall(StrictModel):
     kind: Literal["no_fall"] = "no_fall"
     min_torso_up: float = Field(default=0.3, gt=-1, lt=1, description="smallest cosine of the torso's tilt")
     min_com_height: NonNegative = Field(default=0.12, description="[m] smallest CoM height over the lower sole")
+    stop_after: Positive | None = Field(
+        default=1.0, description="[s] down for so long without a break, the run ends early; null: never"
+    )
 
 
 class DeclaredContacts(StrictModel):

@@ -27,6 +27,7 @@ class Scenario(StrictModel):
 
     name: FileName = Field(description="Names the results: letters, digits, '_' and '-'.")
     description: str = Field(default="", description="What the scenario shows, in a sentence.")
+    paper: str = Field(default="", description="The figure of the paper that it repeats; empty: an extension of it.")
     robot: str = Field(
         default="surena_mini",
         min_length=1,

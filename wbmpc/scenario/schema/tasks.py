@@ -52,7 +52,23 @@ class ComHeightTask(StrictModel):
         return self.waypoints[-1].time
 
 
-class ReachTask(StrictModel):
+class ExcursionTask(StrictModel):
+    """Common to the tasks that go to a target, stay there, and come back to standing."""
+
+    start: NonNegative = Field(default=0.5, description="When the way to the target begins [s].")
+    arrive_by: Positive = Field(description="When the target shall be reached [s].")
+    hold: NonNegative = Field(default=2.0, description="How long to stay at the target [s].")
+    tolerance: Positive = Field(default=0.01, description="Distance from the target below which the hold counts [m].")
+    patience: NonNegative = Field(default=4.0, description="Extra time at the target before the hold is given up [s].")
+    withdraw: Positive = Field(default=2.5, description="How long the way back to standing takes [s].")
+
+    @property
+    def end(self) -> float:
+        """When the robot stands again [s], if nothing delays it."""
+        return self.arrive_by + self.hold + self.withdraw
+
+
+class ReachTask(ExcursionTask):
     """Bring a palm to a target, hold it there, and come back to standing."""
 
     kind: Literal["reach"] = Field(description="Bring a palm to a target, hold it, come back.")
@@ -60,17 +76,13 @@ class ReachTask(StrictModel):
         default="auto", description="Which hand; auto: the planner takes the one that is nearer to the target."
     )
     target: Vector3 = Field(description="Where the palm's centre shall be, in world [m].")
-    start: NonNegative = Field(default=0.5, description="When the hand starts to move [s].")
-    arrive_by: Positive = Field(description="When the palm shall be at the target [s].")
-    hold: NonNegative = Field(default=2.0, description="How long the palm stays at the target [s].")
-    tolerance: Positive = Field(default=0.01, description="Palm error below which the hold counts [m].")
-    patience: NonNegative = Field(default=4.0, description="Extra time at the target before the hold is given up [s].")
-    withdraw: Positive = Field(default=2.5, description="How long the way back to standing takes [s].")
 
-    @property
-    def end(self) -> float:
-        """When the robot stands again [s], if nothing delays the reach."""
-        return self.arrive_by + self.hold + self.withdraw
+
+class LeanTask(ExcursionTask):
+    """Bring the CoM over a point of the ground, hold it there, and come back to standing; both hands are free."""
+
+    kind: Literal["lean"] = Field(description="Bring the CoM over a point, hold it, come back.")
+    target: Vector2 = Field(description="Where the CoM's ground projection shall be: world x, y [m].")
 
 
 class VelocityCommand(StrictModel):
@@ -137,4 +149,6 @@ class GoTask(StrictModel):
 
 FootworkTask = WalkTask | StepTask | GoTask  # the tasks that move the feet
 
-Task = Annotated[StandTask | ComHeightTask | ReachTask | WalkTask | StepTask | GoTask, Field(discriminator="kind")]
+Task = Annotated[
+    StandTask | ComHeightTask | ReachTask | LeanTask | WalkTask | StepTask | GoTask, Field(discriminator="kind")
+]

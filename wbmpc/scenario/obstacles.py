@@ -1,0 +1,38 @@
+"""What stands in the way of the feet, in world coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbmpc.scenario.schema.scenario import Scenario
+from wbmpc.signals import Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Obstacle:
+    """A box that no foot may be put on, as the planner sees it."""
+
+    corners: Vector  # (4, 2) [m] of its footprint, counter-clockwise
+    bottom: float  # [m]
+    top: float  # [m]
+
+
+def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
+    """All boxes of a scenario that are not walkable, whether or not they are present, in the order of the file."""
+    return tuple(
+        Obstacle(
+            corners=_corners(np.array(box.position), np.array(box.size[:2]) / 2, box.yaw),
+            bottom=box.bottom,
+            top=box.bottom + box.size[2],
+        )
+        for box in scenario.world.objects.values()
+        if not box.walkable
+    )
+
+
+def _corners(centre: Vector, half: Vector, yaw: float) -> Vector:
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], dtype=float)
+    c, s = np.cos(yaw), np.sin(yaw)
+    return centre + (signs * half) @ np.array([[c, s], [-s, c]])
