@@ -133,7 +133,8 @@ class Gait:
         self._stepping.landed(step)
         self.step = self._stepping.next(self.feet, time)
         self.phase = SupportPhase.DOUBLE if self.step else SupportPhase.STAND
-        self._left = self.step.double_support if self.step else 0.0
+        early = self._left if step.adaptable else 0.0  # a walk keeps its beat: the plan counts on it
+        self._left = self.step.double_support + early if self.step else 0.0
         x, y = sole[:2]
         events.append(f"foot {SIDES[step.side]}: landed at ({x:.3f}, {y:.3f})")
 
@@ -218,7 +219,10 @@ class Gait:
         step = self.step if self.swing is None else self.swing.step
         if self.swing is None:
             assert step is not None
-            intervals.append(Interval(end, feet, -1, moved, _transfer(step, feet, end)))
+            transfer = _transfer(step, feet, end)
+            if transfer and feet.last < 0 and transfer.begin > 0.0:
+                intervals.append(Interval(transfer.begin, feet, -1, moved))
+            intervals.append(Interval(end, feet, -1, moved, transfer))
             end += step.swing_time
         while step is not None and len(steps) < MAX_FOOTSTEPS:
             intervals.append(Interval(end, feet, step.side, moved))

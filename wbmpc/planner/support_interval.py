@@ -15,7 +15,7 @@ from wbmpc.signals import Vector
 class Transfer:
     """The load goes from foot to foot: shares of left and right go linearly from `before` to `after`."""
 
-    begin: float  # [s from now]; before it both feet carry as they like
+    begin: float  # [s from now]
     before: tuple[float, float]
     after: tuple[float, float]
 
@@ -44,16 +44,19 @@ class Interval:
     def weights(self, time: float) -> tuple[float, float] | None:
         """Shares of left and right at `time` [s from now] in a transfer; None when they are free."""
         transfer = self.transfer
-        if transfer is None or time < transfer.begin - 1e-9:
+        if transfer is None:
             return None
-        share = min((time - transfer.begin) / max(self.end - transfer.begin, 1e-6), 1.0)
+        share = min(max((time - transfer.begin) / max(self.end - transfer.begin, 1e-6), 0.0), 1.0)
         left, right = (a + share * (b - a) for a, b in zip(transfer.before, transfer.after, strict=True))
         return left, right
 
     def polygon(self, time: float, *, half_extents: Vector, margin: float) -> SupportPolygon:
         """Where the ZMP may be at `time` [s from now]; soles of `half_extents` (2,) [m], inset by `margin` [m]."""
         positions, yaws = self.feet.positions, self.feet.yaws
-        corners = [foot_corners(position=p, yaw=float(y), half_extents=half_extents) for p, y in zip(positions, yaws)]
+        corners = [
+            foot_corners(position=p, yaw=float(y), half_extents=half_extents)
+            for p, y in zip(positions, yaws, strict=True)
+        ]
         weights = self.weights(time)
         if weights is None:
             points = np.vstack([corners[side] for side in self.standing])
