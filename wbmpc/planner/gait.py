@@ -69,6 +69,12 @@ class Gait:
             return None
         return Stride(step, self.feet, self.swing, self._left)
 
+    @property
+    def crouch(self) -> float:
+        """How much lower than a standing CoM that of a walk is [m]; 0 when not walking."""
+        step = self.step if self.swing is None else self.swing.step
+        return self._settings.crouch if step is not None and step.adaptable else 0.0
+
     # ------------------------------------------------------------------ one plan later
 
     def advance(

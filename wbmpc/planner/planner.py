@@ -104,9 +104,8 @@ class Planner:
             foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        height, solution = self._plan_height(
-            references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane
-        )
+        wanted_height = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot))
+        height, solution = self._plan_height(wanted_height - self._gait.crouch, band, plane)
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()

@@ -70,6 +70,7 @@ class GaitSettings(StrictModel):
     double_support: float = Field(0.15, gt=0.02, description="[s] between two walking steps")
     first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
     step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
+    crouch: float = Field(0.015, ge=0, description="[m] by which a walking CoM is lower: legs need length to step out")
     step_width: float = Field(0.09, gt=0, description="[m] between the soles' centres when walking")
     turning_room: float = Field(
         0.07, ge=0, description="[m] by which that width grows with the sine of the angle between the soles"
