@@ -2,8 +2,9 @@
 
     python -m benchmarks.record_instances [--out tests/qp/instances]
 
-Runs `reach` in lockstep, as it is and with a table that bears 0.05 N, and keeps one problem for each line of MOMENTS:
-the first one that a solver answers at or after the stated time. Run it again when a problem's shape changes.
+Runs `two_hands` in lockstep, and `reach`, as it is and with a table that bears 0.05 N, and keeps one problem for each
+line of MOMENTS: the first one that a solver answers at or after the stated time. Run it again when a problem's shape
+changes.
 """
 
 from __future__ import annotations
@@ -40,12 +41,16 @@ class _Enough(Exception):
     """Nothing is left to keep of this run."""
 
 
-RUNS = {
-    "reach": {},
-    "weak_table": {
-        "patches": {"weak": {"on": "table", "offset": [-0.06, -0.11], "force_cap": 0.05}},
-        "checks": [{"kind": "upright_at_end"}],
-    },
+RUNS: dict[str, tuple[str, dict[str, Any]]] = {  # scenario, and what is changed of it
+    "reach": ("reach", {}),
+    "weak_table": (
+        "reach",
+        {
+            "patches": {"weak": {"on": "table", "offset": [-0.06, -0.11], "force_cap": 0.05}},
+            "checks": [{"kind": "upright_at_end"}],
+        },
+    ),
+    "two_hands": ("two_hands", {}),
 }
 MOMENTS = (
     Moment("stage1_start", "ComHeightStage 1", 0.0),
@@ -56,16 +61,19 @@ MOMENTS = (
     Moment("stage2_execute_lean", "WholeBodyStage 2", 8.5),
     Moment("stage3_choice", "ContactChoice 1", 0.0),  # the mixed-integer problem when a contact is needed
     Moment("stage3_hopeless", "ContactChoice 1", 0.0, SolveStatus.INFEASIBLE, run="weak_table"),  # no candidate helps
+    Moment("stage3_two", "ContactChoice 1", 0.0, run="two_hands"),  # one contact is not enough
     Moment("stage3_force_ramp", "ContactForce 1", 4.0),
     Moment("stage3_force_lean", "ContactForce 1", 8.5),
+    Moment("stage3_force_two", "ContactForce 1", 7.0, run="two_hands"),
     Moment("tracker_stand", "Tracker 1", 1.0),
     Moment("tracker_braced", "Tracker 1", 8.5),
 )
 
 
-def record(run: str, changes: dict[str, Any], out: Path) -> None:
+def record(run: str, out: Path) -> None:
     """Save the moments of one run in the folder `out`."""
-    scenario = load_scenario(ROOT / "scenarios" / "reach.yaml", changes)
+    name, changes = RUNS[run]
+    scenario = load_scenario(ROOT / "scenarios" / f"{name}.yaml", changes)
     robot = Robot.load(robot_path(scenario))
     recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
     left = {moment.name: moment for moment in MOMENTS if moment.run == run}
@@ -91,8 +99,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "tests" / "qp" / "instances")
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
-    for run, changes in RUNS.items():
-        record(run, changes, out)
+    for run in RUNS:
+        record(run, out)
     for path in sorted(out.glob("*.npz")):
         problem = load_instance(path)
         print(f"{path.name}: {problem.variables} variables, {problem.rows} rows, {path.stat().st_size / 1e3:.1f} kB")

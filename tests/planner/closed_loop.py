@@ -1,4 +1,4 @@
-"""The planner in a loop with its own plan: the robot is where the joint reference is, a table pushes back on palms."""
+"""The planner in a loop with its own plan: the robot is where the joint reference is, boxes push back on palms."""
 
 from __future__ import annotations
 
@@ -66,9 +66,12 @@ def state_at(time: float, q: Vector, v: Vector, palm_force: Vector | None = None
 
 
 def run(given: Scenario, seconds: float, *, table: bool = True) -> Run:
-    """Plan every 10 ms; the robot follows q̇ without error, a palm on the table feels what the plan asks of it."""
+    """Plan every 10 ms; the robot follows q̇ without error, a palm on a box feels what the plan asks of it.
+
+    `table`: whether the boxes are where the planner believes them to be, or nowhere.
+    """
     planner, out = make_planner(given), Run()
-    box = given.world.objects["table"] if table and "table" in given.world.objects else None
+    boxes = [box for box in given.world.objects.values() if table and box.present]
     q, v, force = ROBOT.home_q.copy(), np.zeros(ROBOT.nv), np.zeros((2, 3))
     for k in range(round(seconds / PERIOD)):
         plan = planner.solve(state_at(k * PERIOD, q, v, force))
@@ -79,7 +82,8 @@ def run(given: Scenario, seconds: float, *, table: bool = True) -> Run:
         out.palms.append(where)
         force = np.zeros((2, 3))
         for side, palm in enumerate(where):
-            if box is None or not _over(palm, box.centre, box.size):
+            box = next((box for box in boxes if _over(palm, box.centre, box.size)), None)
+            if box is None:
                 continue
             depth = box.centre[2] + box.size[2] / 2 - (palm[2] - ROBOT.palm_radius)
             pressed = STIFFNESS * max(depth, 0.0)
