@@ -102,7 +102,9 @@ class Planner:
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
         wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot))
-        height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
+        height, solution = self._height_stage.plan(
+            self._com.value[2], wanted=wanted - self._gait.crouch, band=band, plane=plane
+        )
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
