@@ -129,6 +129,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         foot_stance=np.ones(2, bool),
         foot_position=sole,
         foot_yaw=np.zeros(2),
+        foot_yaw_rate=np.zeros(2),
         foot_velocity=np.zeros((2, 3)),
         foot_acceleration=np.zeros((2, 3)),
         hand_mode=np.array([HandMode.MOVE, HandMode.FREE]),
@@ -140,6 +141,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         hand_normal=np.tile([0.0, 0, 1], (2, 1)),
         hand_urgency=np.zeros(2),
         hand_friction=np.full(2, 0.5),
+        arm_keep_out=np.tile([0.0, 0.0, 0.0, -np.inf], (2, 3, 1)),
     )
     command = TorqueCommand(
         torque=truth.torque,

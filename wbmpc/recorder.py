@@ -85,6 +85,7 @@ _SETPOINT: _Layout = {
     "foot_stance": ((2,), bool),
     "foot_position": ((2, 3), float),
     "foot_yaw": ((2,), float),
+    "foot_yaw_rate": ((2,), float),
     "foot_velocity": ((2, 3), float),
     "foot_acceleration": ((2, 3), float),
     "hand_mode": ((2,), int),
@@ -96,6 +97,7 @@ _SETPOINT: _Layout = {
     "hand_force_cap": ((2,), float),
     "hand_normal": ((2, 3), float),
     "hand_friction": ((2,), float),
+    "arm_keep_out": ((2, 3, 4), float),
 }
 _COMMAND: _Layout = {
     "torque": (("j",), float),

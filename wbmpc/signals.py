@@ -94,6 +94,7 @@ class Setpoint:
     foot_stance: NDArray[np.bool_]  # (2,)
     foot_position: Vector  # (2, 3) [m] sole in world
     foot_yaw: Vector  # (2,) [rad]
+    foot_yaw_rate: Vector  # (2,) [rad/s]
     foot_velocity: Vector  # (2, 3) [m/s]
     foot_acceleration: Vector  # (2, 3) [m/s²]
     hand_mode: NDArray[np.int64]  # (2,) HandMode
@@ -105,6 +106,7 @@ class Setpoint:
     hand_force_cap: Vector  # (2,) [N] bound on the normal force, ramped: contact transitions without jumps
     hand_normal: Vector  # (2, 3) contact normal, out of the surface
     hand_friction: Vector  # (2,) planned friction coefficient
+    arm_keep_out: Vector  # (2, 3, 4) half-spaces a·x ≥ b of palm, forearm's middle and elbow; b = -inf: none
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,6 +65,7 @@ def velocity_tasks(rng: np.random.Generator | None = None) -> VelocityTasks:
         torso_jacobian=kinematics.jacobian(ROBOT.torso_frame)[3:],
         torso_velocity=random(3, 0.2),
         posture_velocity=np.concatenate([np.zeros(6), random(nj, 0.3)]),
+        posture_weight=np.ones(6 + nj) if rng is None else rng.uniform(0.5, 30.0, 6 + nj),
         lower=np.concatenate([np.full(6, -5.0), np.full(nj, -3.0) if rng is None else rng.uniform(-3.0, 0.0, nj)]),
         upper=np.concatenate([np.full(6, 5.0), np.full(nj, 3.0) if rng is None else rng.uniform(0.0, 3.0, nj)]),
     )

@@ -79,7 +79,13 @@ class Candidates:
         return min(palm, com)
 
     def choose(
-        self, need: Need, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon,
+        self,
+        need: Need,
+        *,
+        palms: Vector,
+        free_hands: list[bool],
+        held: list[Option],
+        polygon: SupportPolygon,
         urgency: float,
     ) -> tuple[list[Candidate], tuple[CandidateReport, ...], StageReport]:
         """Stage 3 for a need of ContactChoice.KNOTS knots.
@@ -96,7 +102,9 @@ class Candidates:
         """
         if self._choice is None:
             return [], (), StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
-        distances, reasons = self._sort_out(palms=palms, free_hands=free_hands, held=held, polygon=polygon, urgency=urgency)
+        distances, reasons = self._sort_out(
+            palms=palms, free_hands=free_hands, held=held, polygon=polygon, urgency=urgency
+        )
         considered = [c for c in self.all if id(c) not in reasons]
         considered.sort(key=lambda candidate: distances[id(candidate)])
         room = self._slots - len(held)
@@ -141,7 +149,12 @@ class Candidates:
         return self._given.solve(need, [replace(contact, held=True) for contact in contacts], left=self._left).objective
 
     def _sort_out(
-        self, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon,
+        self,
+        *,
+        palms: Vector,
+        free_hands: list[bool],
+        held: list[Option],
+        polygon: SupportPolygon,
         urgency: float,
     ) -> tuple[dict[int, float], dict[int, str]]:
         """Way of the palm to each candidate [m], and why some are out of the question; both by id of the candidate."""
@@ -161,7 +174,10 @@ class Candidates:
                 reasons[key] = "tried before, nothing was there"
             elif slack < 0.0:
                 reasons[key] = f"unreachable by {-100.0 * slack:.1f} cm"
-            elif hurried(urgency) and (late := way_time(self._settings, distances[key]) - self._settings.urgent_time) > 0.0:
+            elif (
+                hurried(urgency)
+                and (late := way_time(self._settings, distances[key]) - self._settings.urgent_time) > 0.0
+            ):
                 reasons[key] = f"there {1e3 * late:.0f} ms too late"
         return distances, reasons
 

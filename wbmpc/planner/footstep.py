@@ -24,9 +24,20 @@ class Footstep:
     task: int  # index of the task that asks for it
 
     def share(self, sigma: Vector) -> Vector:
-        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time; minimum jerk between leads."""
+        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time: minimum jerk."""
         phase = np.clip((sigma - self.lead) / (1.0 - 2.0 * self.lead), 0.0, 1.0)
         return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
+
+
+@dataclass(frozen=True, slots=True)
+class SoleReferences:
+    """Where both soles should be now, and how they should move: those that stand stay."""
+
+    positions: Vector  # (2, 3) [m] in world
+    yaws: Vector  # (2,) [rad]
+    velocities: Vector  # (2, 3) [m/s]
+    yaw_rates: Vector  # (2,) [rad/s]
+    accelerations: Vector  # (2, 3) [m/s²]
 
 
 @dataclass(frozen=True, slots=True)

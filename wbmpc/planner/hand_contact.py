@@ -195,7 +195,9 @@ class HandContact:
         if phase == ContactPhase.APPROACHING:
             if self._landing is not None and normal_force <= settings.sensed_force:
                 self._aim(palm, palm_velocity)
-            return self._approach(dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home)
+            return self._approach(
+                dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home
+            )
         elif phase == ContactPhase.RELEASED:
             self._sigma += self._rate * dt
             if self._sigma <= 0.0:
@@ -225,7 +227,9 @@ class HandContact:
                 self._descend_again(palm)
         return None
 
-    def _approach(self, dt: float, *, palm: Vector, palm_velocity: Vector, normal_force: float, needed: bool, home: Vector) -> str | None:
+    def _approach(
+        self, dt: float, *, palm: Vector, palm_velocity: Vector, normal_force: float, needed: bool, home: Vector
+    ) -> str | None:
         settings = self._settings
         assert self.patch is not None
         assert self._path is not None

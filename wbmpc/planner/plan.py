@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.whole_body import HorizontalPlan
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
 
@@ -29,6 +31,7 @@ class Plan:
     foot_stance: NDArray[np.bool_]  # (2,)
     foot_position: Vector  # (2, 3) [m]
     foot_yaw: Vector  # (2,) [rad]
+    foot_yaw_rate: Vector  # (2,) [rad/s]
     foot_velocity: Vector  # (2, 3) [m/s]
     foot_acceleration: Vector  # (2, 3) [m/s²]
     hand_mode: NDArray[np.int64]  # (2,)
@@ -42,6 +45,7 @@ class Plan:
     hand_force_cap_top: Vector  # (2,) [N]
     hand_normal: Vector  # (2, 3)
     hand_friction: Vector  # (2,)
+    arm_keep_out: Vector  # (2, 3, 4)
     report: PlanReport
 
     def com_state(self, time: float) -> Vector:
@@ -78,7 +82,8 @@ class Plan:
             torso_angular_velocity=going * self.torso_angular_velocity,
             foot_stance=self.foot_stance,
             foot_position=self.foot_position + dt * self.foot_velocity + dt**2 / 2 * self.foot_acceleration,
-            foot_yaw=self.foot_yaw,
+            foot_yaw=self.foot_yaw + dt * self.foot_yaw_rate,
+            foot_yaw_rate=going * self.foot_yaw_rate,
             foot_velocity=going * (self.foot_velocity + dt * self.foot_acceleration),
             foot_acceleration=going * self.foot_acceleration,
             hand_mode=self.hand_mode,
@@ -92,4 +97,25 @@ class Plan:
             ),
             hand_normal=self.hand_normal,
             hand_friction=self.hand_friction,
+            arm_keep_out=self.arm_keep_out,
         )
+
+
+def com_course(now: Vector, motion: HorizontalPlan | None, height: HeightPlan) -> tuple[Vector, Vector]:
+    """CoM states (N + 1, 3 axes, 3) now and at every knot, and jerks (N, 3), of what stages 1 and 2 have planned.
+
+    Args:
+        now: (3, 3) c, ċ, c̈ per axis [m, m/s, m/s²].
+        motion: None when stage 2 has failed: the CoM stays where it is, with its velocity as reference.
+        height: stage 1's answer.
+    """
+    n = len(height.jerk)
+    states, jerk = np.empty((n + 1, 3, 3)), np.zeros((n, 3))
+    states[0] = now
+    jerk[:, 2] = height.jerk
+    states[1:, 2] = np.column_stack([height.height, height.velocity, height.acceleration])
+    states[1:, :2] = now[:2]
+    if motion is not None:
+        jerk[:, :2] = motion.jerk
+        states[1:, :2] = np.stack([motion.com, motion.velocity, motion.acceleration], axis=2)
+    return states, jerk

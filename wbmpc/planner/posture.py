@@ -6,7 +6,7 @@ import numpy as np
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.robot import Robot
-from wbmpc.rotations import level_frame, rotation_error
+from wbmpc.rotations import heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
 
 SOLE_COST, PALM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3.0, 2e-3
@@ -14,6 +14,7 @@ DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 PATIENCE = 120  # iterations for the same targets; what has not converged by then is out of reach
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
+SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets are in reach
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
@@ -35,6 +36,7 @@ class Posture:
         self._lower, self._upper = robot.joint_lower + JOINT_MARGIN, robot.joint_upper - JOINT_MARGIN
         self.q = nominal.copy()  # (nq,)
         self.com = np.zeros(3)  # [m] of the last iterate
+        self.palm_errors = np.zeros(2)  # [m] of the last iterate; 0 without a target
         self.residual = np.inf  # [m] largest palm or sole error of the last iterate
         self._reached: tuple[bool, ...] = ()  # which palms had a target
         self._targets: tuple[bytes, ...] = ()
@@ -42,9 +44,19 @@ class Posture:
         self._left = PATIENCE
 
     @property
+    def settled(self) -> bool:
+        """Whether more iterations for the same targets would change nothing, or have been given up."""
+        return self._step < SETTLED or self._left == 0
+
+    @property
     def torso_up(self) -> Vector:
         """(3,) the torso's own vertical in world at the last iterate."""
         return self._kinematics.rotation(self._robot.torso_frame)[:, 2]
+
+    @property
+    def torso_heading(self) -> float:
+        """Yaw of the torso at the last iterate [rad]."""
+        return heading_of(self._kinematics.rotation(self._robot.torso_frame))
 
     def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector) -> None:
         """Run `count` iterations.
@@ -70,6 +82,7 @@ class Posture:
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
             self.residual = 0.0
+            self.palm_errors[:] = 0.0
             for side, frame in enumerate(robot.sole_frames):
                 level = level_frame(yaws[side])
                 J = kinematics.jacobian(frame)
@@ -88,7 +101,8 @@ class Posture:
                     continue
                 J = kinematics.jacobian(frame)[:3]
                 error = target - kinematics.position(frame)
-                self.residual = max(self.residual, float(np.linalg.norm(error)))
+                self.palm_errors[side] = np.linalg.norm(error)
+                self.residual = max(self.residual, float(self.palm_errors[side]))
                 error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
                 H += PALM_COST * (J.T @ J)
                 g += PALM_COST * (J.T @ error)

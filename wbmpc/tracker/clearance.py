@@ -1,4 +1,4 @@
-"""Rows that keep the arms off the trunk, and a forearm off the surface that its palm rests on."""
+"""Rows that keep the arms off the trunk and off obstacles, and a forearm off the surface that its palm rests on."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from wbmpc.rotations import cross
 from wbmpc.signals import HandMode, Setpoint, Vector
 from wbmpc.tracker.settings import TrackerSettings
 
+SHARES = (0.0, 0.5, 1.0)  # of the elbow in an arm's points; the rest is the palm's
 POINTS = 3  # of each arm: palm, middle of the forearm, elbow
-ROWS_PER_ARM = POINTS + 1
+ROWS_PER_ARM = 2 * POINTS + 1
 CLEARANCE_ROWS = 2 * ROWS_PER_ARM
 NEAR = 0.10  # [m] a point farther than this from its bound is left alone
 CONTACT = int(HandMode.CONTACT)
@@ -22,7 +23,8 @@ class Clearance:
 
     For palm, middle of the forearm and elbow d is the distance from the trunk's axis (the torso's z), a cylinder round
     everything between pelvis and head. For the elbow of an arm whose palm is in contact it is also the height above
-    the contact's tangent plane: a fixed palm leaves an arm of four joints one freedom, and it would find the wall.
+    the contact's tangent plane: a fixed palm leaves an arm of four joints one freedom, and it would find the wall. For
+    the points of a free arm it is also the distance from the half-spaces of the setpoint.
     """
 
     def __init__(self, robot: Robot, settings: TrackerSettings) -> None:
@@ -38,7 +40,7 @@ class Clearance:
         origin, axis = kinematics.position(torso), kinematics.rotation(torso)[:, 2]
         for side in range(2):
             palm, elbow = (kinematics.position(f[side]) for f in (robot.palm_frames, robot.elbow_frames))
-            for i, share in enumerate((0.0, 0.5, 1.0)):  # of the elbow; the rest is the palm's
+            for i, share in enumerate(SHARES):
                 offset = palm + share * (elbow - palm) - origin
                 along = (offset @ axis) * axis
                 outward = offset - along
@@ -52,6 +54,13 @@ class Clearance:
                 jacobian -= outward @ trunk[:3] + cross(along, outward) @ trunk[3:]
                 drift -= float(outward @ kinematics.drift(torso)[:3])
                 self._barrier(ROWS_PER_ARM * side + i, jacobian, drift, gap, v)
+            for i, share in enumerate(SHARES):
+                plane = setpoint.arm_keep_out[side, i]
+                if plane[3] > -np.inf:
+                    point = palm + share * (elbow - palm)
+                    jacobian, drift = self._arm_point(kinematics, side, share, plane[:3])
+                    gap = float(plane[:3] @ point) - plane[3]
+                    self._barrier(ROWS_PER_ARM * side + POINTS + 1 + i, jacobian, drift, gap, v)
             if int(setpoint.hand_mode[side]) == CONTACT:
                 normal = setpoint.hand_normal[side]
                 gap = float(normal @ (elbow - palm)) - settings.elbow_clearance
@@ -72,6 +81,4 @@ class Clearance:
     def _barrier(self, row: int, jacobian: Vector, drift: float, gap: float, v: Vector) -> None:
         settings = self._settings
         self.matrix[row] = jacobian
-        self.lower[row] = (
-            -settings.clearance_stiffness * gap - settings.clearance_damping * float(jacobian @ v) - drift
-        )
+        self.lower[row] = -settings.clearance_stiffness * gap - settings.clearance_damping * float(jacobian @ v) - drift
