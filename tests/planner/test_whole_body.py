@@ -345,7 +345,7 @@ def test_a_known_force_lets_the_com_past_the_toes() -> None:
 
 
 def test_a_footstep_goes_where_the_capture_point_is() -> None:
-    """Herdt: pushed sideways on one foot, the next footstep is put further out, and all the more the harder the push."""
+    """Herdt: pushed sideways on one foot, the next footstep goes further out, the more the harder the push."""
     shifts = [solve(pushed(speed)).footstep_shift[0, 1] for speed in (0.2, 0.3, 0.4)]
     assert np.diff(shifts).min() > 0.05
     assert max(solve(pushed(0.3, adaptable=False)).footstep_shift.ravel()) == 0.0

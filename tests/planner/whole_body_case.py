@@ -104,7 +104,7 @@ def random_problem(seed: int, *, walking: bool) -> Problem:
 
 
 def _footsteps(rng: np.random.Generator) -> SupportPreview:
-    """Left and right by turns, three knots each on one foot, then two on both: any numbers will do, no gait is asked."""
+    """Left and right by turns, three knots each on one foot, then two on both: any numbers will do."""
     m = MAX_FOOTSTEPS
     places = np.column_stack([0.04 * np.arange(m + 1), np.where(np.arange(m + 1) % 2, -0.045, 0.045)])
     places += rng.uniform(-0.01, 0.01, places.shape)
