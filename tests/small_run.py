@@ -129,6 +129,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         foot_stance=np.ones(2, bool),
         foot_position=sole,
         foot_yaw=np.zeros(2),
+        foot_yaw_rate=np.zeros(2),
         foot_velocity=np.zeros((2, 3)),
         foot_acceleration=np.zeros((2, 3)),
         hand_mode=np.array([HandMode.MOVE, HandMode.FREE]),

@@ -85,6 +85,7 @@ _SETPOINT: _Layout = {
     "foot_stance": ((2,), bool),
     "foot_position": ((2, 3), float),
     "foot_yaw": ((2,), float),
+    "foot_yaw_rate": ((2,), float),
     "foot_velocity": ((2, 3), float),
     "foot_acceleration": ((2, 3), float),
     "hand_mode": ((2,), int),

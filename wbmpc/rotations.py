@@ -29,6 +29,16 @@ def rotation_error(*, desired: Vector, measured: Vector) -> Vector:
     return axis * (0.5 * np.arctan2(sine, cosine) / sine)
 
 
+def heading_of(rotation: Vector) -> float:
+    """Yaw [rad] of a frame (3, 3) that is not too far from level: the direction of its x axis in the ground plane."""
+    return float(np.arctan2(rotation[1, 0], rotation[0, 0]))
+
+
+def angle_difference(a: float, b: float) -> float:
+    """a − b [rad], by the shorter way: in [−π, π)."""
+    return (a - b + np.pi) % (2.0 * np.pi) - np.pi
+
+
 def contact_frame(normal: Vector) -> Vector:
     """Rotation (3, 3) whose columns are two tangents and the unit `normal` (3,), in world."""
     helper = np.array([1.0, 0.0, 0.0]) if abs(normal[0]) < 0.7 else np.array([0.0, 1.0, 0.0])

@@ -94,6 +94,7 @@ class Setpoint:
     foot_stance: NDArray[np.bool_]  # (2,)
     foot_position: Vector  # (2, 3) [m] sole in world
     foot_yaw: Vector  # (2,) [rad]
+    foot_yaw_rate: Vector  # (2,) [rad/s]
     foot_velocity: Vector  # (2, 3) [m/s]
     foot_acceleration: Vector  # (2, 3) [m/s²]
     hand_mode: NDArray[np.int64]  # (2,) HandMode

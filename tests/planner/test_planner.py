@@ -23,7 +23,7 @@ NEAR = {"tasks.0.target": [0.24, 0.10, 0.32]}
 
 @cache
 def far_reach() -> Run:
-    return run(REACH, 13.5)
+    return run(REACH, 15.0)
 
 
 @cache
@@ -49,6 +49,7 @@ def test_the_far_target_is_reached_with_the_com_past_the_toes() -> None:
     held = [plan for plan, error in zip(result.plans, errors, strict=True) if error < 0.01]
     assert min(plan.com_states[0, 0, 0] for plan in held[50:-50]) > TOES + 0.03
     assert_allclose(result.palms[-1], result.palms[0], atol=8e-3)  # and back again
+    assert_allclose(result.plans[-1].torso_rotation, result.plans[0].torso_rotation, atol=0.1)  # upright, not twisted
 
 
 def test_the_task_waits_for_an_expected_contact() -> None:
@@ -64,7 +65,7 @@ def test_every_report_of_a_candidate_says_why_it_lost() -> None:
     by_name = {(c.patch, c.hand): c for c in far_reach().fired[0].candidates}
     assert len(by_name) == 2 * len(resolve_patches(REACH))
     assert by_name["table_far", 1].reason.startswith("unreachable by")
-    assert by_name["wall_1", 1].reason.startswith("unreachable by")
+    assert by_name["wall_1", 1].reason == "no force in its cone gives the shift"  # it would push to the left
     assert all(c.reason == "hand is in use" for (_, hand), c in by_name.items() if hand == 0)
     winner = by_name["table_right_1", 1]
     assert winner.cost == min(c.cost for c in by_name.values())

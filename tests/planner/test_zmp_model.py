@@ -155,7 +155,7 @@ def test_need_of_a_wish(seed: int, exact: bool) -> None:
     zero = np.zeros((1, 2))
     wish = HorizontalPlan(
         jerk=zero, com=case.com[None, :2], velocity=zero, acceleration=case.acceleration[None, :2], delta_z=shift,
-        zmp=zero, joint_velocity=np.zeros(0),
+        zmp=zero, footstep_shift=zero, joint_velocity=np.zeros(0),
     )  # fmt: skip
     expected = case.need(shift[0], formulation="exact" if exact else "paper")
     model = free_model(preview, height, plane=PLANE, mass=MASS, exact=exact)

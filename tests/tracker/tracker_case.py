@@ -60,6 +60,7 @@ def standing(q: Vector = ROBOT.home_q, **changes: Any) -> Setpoint:
         foot_stance=np.ones(2, bool),
         foot_position=np.array([placement(q, f).translation for f in ROBOT.sole_frames]),
         foot_yaw=np.zeros(2),
+        foot_yaw_rate=np.zeros(2),
         foot_velocity=np.zeros((2, 3)),
         foot_acceleration=np.zeros((2, 3)),
         hand_mode=np.array([HandMode.FREE, HandMode.FREE]),

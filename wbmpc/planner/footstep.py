@@ -30,6 +30,17 @@ class Footstep:
 
 
 @dataclass(frozen=True, slots=True)
+class SoleReferences:
+    """Where both soles should be now, and how they should move: those that stand stay."""
+
+    positions: Vector  # (2, 3) [m] in world
+    yaws: Vector  # (2,) [rad]
+    velocities: Vector  # (2, 3) [m/s]
+    yaw_rates: Vector  # (2,) [rad/s]
+    accelerations: Vector  # (2, 3) [m/s²]
+
+
+@dataclass(frozen=True, slots=True)
 class Feet:
     """Where both feet stand, or will stand; the steps are planned from this."""
 

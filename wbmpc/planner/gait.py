@@ -7,13 +7,14 @@ from enum import IntEnum
 
 import numpy as np
 
-from wbmpc.planner.footstep import Feet, Footstep
+from wbmpc.planner.footstep import Feet, Footstep, SoleReferences
 from wbmpc.planner.settings import GaitSettings
-from wbmpc.planner.stepping import SIDE_SIGN, Stepping
+from wbmpc.planner.stepping import SIDE_SIGN, Stepping, turning_room
 from wbmpc.planner.stride import Stride
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.swing import Swing
+from wbmpc.rotations import angle_difference
 from wbmpc.signals import SIDES, Vector
 
 EARLY = 0.6  # share of the swing from which a touch counts as the landing
@@ -59,16 +60,16 @@ class Gait:
         """Which feet stand."""
         return tuple(self.swing is None or self.swing.step.side != side for side in range(2))  # type: ignore[return-value]
 
-    def soles(self, rate: float) -> tuple[Vector, Vector, Vector, Vector]:
-        """Positions (2, 3) [m], yaws (2,) [rad], velocities and accelerations (2, 3) of both soles now."""
-        positions, yaws = self.feet.positions.copy(), self.feet.yaws.copy()
-        velocity, acceleration = np.zeros((2, 3)), np.zeros((2, 3))
+    def soles(self, rate: float) -> SoleReferences:
+        """Both soles now, the present phase going on at `rate` (0 … 1)."""
+        positions, yaws, yaw_rates = self.feet.positions.copy(), self.feet.yaws.copy(), np.zeros(2)
+        velocities, accelerations = np.zeros((2, 3)), np.zeros((2, 3))
         if self.swing is not None:
             side = self.swing.step.side
             pace = rate / self.swing.step.swing_time if self._left > 0.0 else 0.0
-            positions[side], velocity[side], acceleration[side] = self.swing.reference(pace)
-            yaws[side] = self.swing.yaw
-        return positions, yaws, velocity, acceleration
+            positions[side], velocities[side], accelerations[side] = self.swing.reference(pace)
+            yaws[side], yaw_rates[side] = self.swing.heading(pace)
+        return SoleReferences(positions, yaws, velocities, yaw_rates, accelerations)
 
     @property
     def stride(self) -> Stride | None:
@@ -135,7 +136,8 @@ class Gait:
         assert self.swing is not None
         step = self.swing.step
         positions, yaws = self.feet.positions.copy(), self.feet.yaws.copy()
-        positions[step.side], yaws[step.side] = sole, yaw
+        positions[step.side] = sole
+        yaws[step.side] = step.yaw + angle_difference(yaw, step.yaw)  # whole turns are kept
         self.feet = Feet(positions, yaws, step.side)
         self.swing = None
         self._stepping.landed(step)
@@ -253,7 +255,8 @@ class Gait:
             axes[j] = [[c, s], [-s, c]]
             nominal = axes[j] @ (step.position - feet.positions[stance])[:2]
             if step.adaptable:
-                widths = sorted((SIDE_SIGN[step.side] * settings.narrowest, SIDE_SIGN[step.side] * settings.widest))
+                narrowest = settings.narrowest + turning_room(settings, step.yaw - float(feet.yaws[stance]))
+                widths = sorted((SIDE_SIGN[step.side] * narrowest, SIDE_SIGN[step.side] * settings.widest))
                 low, high = np.array([-settings.longest, widths[0]]), np.array([settings.longest, widths[1]])
                 placement_lower[j] = np.minimum(low, nominal) - nominal
                 placement_upper[j] = np.maximum(high, nominal) - nominal

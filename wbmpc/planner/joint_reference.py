@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.kinematics import Kinematics
+from wbmpc.planner.footstep import SoleReferences
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.whole_body import VelocityTasks
 from wbmpc.robot import Robot
-from wbmpc.rotations import cross, level_frame, rotation_error
+from wbmpc.rotations import angle_difference, cross, heading_of, level_frame, rotation_error
 from wbmpc.signals import SIDES, HandMode, Vector
 
 LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
@@ -25,6 +26,8 @@ class JointReference:
     def __init__(self, robot: Robot, settings: WholeBodySettings, *, q: Vector) -> None:
         self._robot, self._settings = robot, settings
         self._kinematics = Kinematics(robot)
+        self._upper_body = np.setdiff1d(np.arange(robot.nj), np.concatenate(robot.leg_joints))
+        self._trunk = np.setdiff1d(self._upper_body, np.concatenate(robot.arm_joints))
         self.q = q.copy()  # (nq,)
         self._kinematics.update_kinematics(self.q)
 
@@ -59,23 +62,22 @@ class JointReference:
         *,
         com: Vector,
         vertical_velocity: float,
-        soles: Vector,
-        yaws: Vector,
-        sole_velocities: Vector,
+        soles: SoleReferences,
         hands: list[tuple[Vector, Vector, HandMode]],
         posture: Vector,
         torso_up: Vector,
+        torso_heading: float,
     ) -> VelocityTasks:
         """Stage 2's velocity tasks at the reference.
 
         Args:
             com: planned CoM (3,) now [m].
             vertical_velocity: stage 1's ċ_z [m/s].
-            soles, yaws: where the feet are or should be in their swing, (2, 3) [m] and (2,) [rad].
-            sole_velocities: (2, 3) [m/s].
+            soles: where the feet are or should be in their swing.
             hands: position [m], velocity [m/s] (3,) and mode of each hand.
             posture: (nj,) joint angles to be drawn to [rad].
             torso_up: (3,) where the torso's own vertical should point, in world.
+            torso_heading: its yaw [rad].
         """
         robot, settings, kinematics, nv = self._robot, self._settings, self._kinematics, self._robot.nv
         kinematics.update_kinematics(self.q)
@@ -85,15 +87,16 @@ class JointReference:
         active = np.zeros(2)
         for side in range(len(SIDES)):
             frame = robot.sole_frames[side]
-            level = level_frame(yaws[side])
+            level = level_frame(soles.yaws[side])
             rows = slice(6 * side, 6 * side + 6)
             foot_jacobian[rows] = kinematics.jacobian(frame)
-            foot_velocity[6 * side : 6 * side + 3] = sole_velocities[side] + rate * (
-                soles[side] - kinematics.position(frame)
+            foot_velocity[6 * side : 6 * side + 3] = soles.velocities[side] + rate * (
+                soles.positions[side] - kinematics.position(frame)
             )
             foot_velocity[6 * side + 3 : 6 * side + 6] = rate * rotation_error(
                 desired=level, measured=kinematics.rotation(frame)
             )
+            foot_velocity[6 * side + 5] += soles.yaw_rates[side]
             frame = robot.palm_frames[side]
             hand_jacobian[3 * side : 3 * side + 3] = kinematics.jacobian(frame)[:3]
             position, velocity, mode = hands[side]
@@ -102,7 +105,14 @@ class JointReference:
                 pull = rate * (position - kinematics.position(frame))
                 norm = float(np.linalg.norm(pull))
                 hand_velocity[3 * side : 3 * side + 3] = velocity + pull * min(1.0, 0.4 / max(norm, 1e-9))
-        up = kinematics.rotation(robot.torso_frame)[:, 2]
+        torso = kinematics.rotation(robot.torso_frame)
+        torso_error = cross(torso[:, 2], torso_up)
+        torso_error[2] += angle_difference(torso_heading, heading_of(torso))
+        weight = np.ones(nv)  # the legs carry the CoM about: arms and waist have better things to do
+        weight[6 + self._upper_body] = settings.upper_body_share
+        for side in range(len(SIDES)):
+            if active[side]:
+                weight[6 + robot.arm_joints[side]] = weight[6 + self._trunk] = 1.0
         posture_velocity = np.zeros(nv)
         posture_velocity[6:] = settings.posture_rate * (posture - self.q[7:])
         speed = SPEED_SHARE * robot.joint_speed
@@ -119,8 +129,9 @@ class JointReference:
             hand_velocity=hand_velocity,
             hand_active=active,
             torso_jacobian=kinematics.jacobian(robot.torso_frame)[3:],
-            torso_velocity=settings.torso_rate * cross(up, torso_up),
+            torso_velocity=settings.torso_rate * torso_error,
             posture_velocity=posture_velocity,
+            posture_weight=weight,
             lower=lower,
             upper=upper,
         )

@@ -29,6 +29,7 @@ class Plan:
     foot_stance: NDArray[np.bool_]  # (2,)
     foot_position: Vector  # (2, 3) [m]
     foot_yaw: Vector  # (2,) [rad]
+    foot_yaw_rate: Vector  # (2,) [rad/s]
     foot_velocity: Vector  # (2, 3) [m/s]
     foot_acceleration: Vector  # (2, 3) [m/s²]
     hand_mode: NDArray[np.int64]  # (2,)
@@ -77,7 +78,8 @@ class Plan:
             torso_angular_velocity=going * self.torso_angular_velocity,
             foot_stance=self.foot_stance,
             foot_position=self.foot_position + dt * self.foot_velocity + dt**2 / 2 * self.foot_acceleration,
-            foot_yaw=self.foot_yaw,
+            foot_yaw=self.foot_yaw + dt * self.foot_yaw_rate,
+            foot_yaw_rate=going * self.foot_yaw_rate,
             foot_velocity=going * (self.foot_velocity + dt * self.foot_acceleration),
             foot_acceleration=going * self.foot_acceleration,
             hand_mode=self.hand_mode,

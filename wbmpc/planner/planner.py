@@ -14,6 +14,7 @@ from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.footholds import Footholds
+from wbmpc.planner.footstep import Feet, SoleReferences
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.plan import Plan
@@ -26,11 +27,13 @@ from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
+from wbmpc.rotations import heading_of
 from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
+STRIDE_ITERATIONS = 50  # when a stride is asked for: half-finished postures would call for contacts
 
 
 class Planner:
@@ -67,6 +70,7 @@ class Planner:
         measured.update_kinematics(q)
         stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
         self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
+        self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._palms = np.array([measured.position(f) for f in robot.palm_frames])
         self._palm_homes = self._in_torso(self._palms)  # where free hands hang
@@ -109,18 +113,19 @@ class Planner:
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._palms)
-        soles, yaws, sole_velocity, sole_acceleration = self._gait.soles(self._gate)
+        soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
-            yaws=yaws,
-            sole_velocities=sole_velocity,
             hands=hands,
-            torso_up=references.torso_up(contacts),
             posture=references.posture(contacts),
+            torso_up=references.torso_up(contacts),
+            torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
         )
-        urgency = 1.0 + self._com.alarm * (settings.whole_body.alarm_urgency - 1.0)
+        # a robot that steps is not to stop, its coming steps catch it
+        alarm = self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
+        urgency = 1.0 + alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
             stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, com_band: Vector
@@ -184,7 +189,7 @@ class Planner:
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
-        self._last = self._make_plan(motion, height, hands, (soles, yaws, sole_velocity, sole_acceleration), report)
+        self._last = self._make_plan(motion, height, hands, soles, report)
         return self._last
 
     # ------------------------------------------------------------------ steps of one plan
@@ -215,7 +220,7 @@ class Planner:
 
     def _measured_yaws(self) -> Vector:
         rotations = (self._measured.rotation(f) for f in self._robot.sole_frames)
-        return np.array([np.arctan2(R[1, 0], R[0, 0]) for R in rotations])
+        return np.array([heading_of(R) for R in rotations])
 
     def _advance(self, state: RobotState, events: list[str]) -> None:
         """Steps, tasks, contacts and the postures behind them one plan further."""
@@ -242,7 +247,9 @@ class Planner:
             homes=self._from_torso(self._palm_homes),
             events=events,
         )
-        self._improve_postures(iterations=2)
+        asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
+        fresh = self._asked is not None and self._asked is not asked  # a stride from where the feet have not stood yet
+        self._improve_postures(iterations=STRIDE_ITERATIONS if fresh else 2)
 
     def _improve_postures(self, *, iterations: int, everyone: bool = False) -> None:
         """Iterate the tasks' postures and the next candidate's (or everyone's)."""
@@ -304,7 +311,7 @@ class Planner:
         motion: HorizontalPlan | None,
         height: HeightPlan,
         hands: list[tuple[Vector, Vector, HandMode]],
-        feet: tuple[Vector, Vector, Vector, Vector],
+        soles: SoleReferences,
         report: PlanReport,
     ) -> Plan:
         if motion is None and self._last is not None:
@@ -335,10 +342,11 @@ class Planner:
             torso_rotation=self._joints.torso_rotation,
             torso_angular_velocity=self._joints.torso_velocity(velocity),
             foot_stance=np.array(self._gait.stance),
-            foot_position=feet[0],
-            foot_yaw=feet[1],
-            foot_velocity=feet[2],
-            foot_acceleration=feet[3],
+            foot_position=soles.positions,
+            foot_yaw=soles.yaws,
+            foot_yaw_rate=soles.yaw_rates,
+            foot_velocity=soles.velocities,
+            foot_acceleration=soles.accelerations,
             hand_mode=np.array([int(mode) for _, _, mode in hands]),
             hand_position=palm_position,
             hand_velocity=palm_velocity,

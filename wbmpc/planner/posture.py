@@ -6,7 +6,7 @@ import numpy as np
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.robot import Robot
-from wbmpc.rotations import level_frame, rotation_error
+from wbmpc.rotations import heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
 
 SOLE_COST, PALM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3.0, 2e-3
@@ -45,6 +45,11 @@ class Posture:
     def torso_up(self) -> Vector:
         """(3,) the torso's own vertical in world at the last iterate."""
         return self._kinematics.rotation(self._robot.torso_frame)[:, 2]
+
+    @property
+    def torso_heading(self) -> float:
+        """Yaw of the torso at the last iterate [rad]."""
+        return heading_of(self._kinematics.rotation(self._robot.torso_frame))
 
     def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector) -> None:
         """Run `count` iterations.

@@ -221,6 +221,11 @@ class References:
         tasks = max((task.progress.sigma for task in self._current), default=0.0)
         return tasks if self._stride is None else max(tasks, self._stride.sigma)
 
+    def torso_heading(self, contacts: Contacts, feet: float) -> float:
+        """Yaw of the torso [rad]: the feet's, `feet`, or as in the postures of contacts and task."""
+        base = feet if contacts.posture is None else contacts.posture.torso_heading
+        return base + self._sigma * (self._goal.torso_heading - base)
+
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
         taken = [task.side for task in self._current if isinstance(task, Reach)]

@@ -32,6 +32,9 @@ class WholeBodySettings(StrictModel):
     delta_z_cost: float = Field(0.2, gt=0, description="[cost / m²] α₂, on the square of ΔZ")
     delta_z_price: float = Field(2.0, ge=0, description="[cost / m] on |ΔZ|: help that is worth less is not asked for")
     joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
+    upper_body_share: float = Field(
+        30.0, gt=0, description="factor on α₃ of the joints that move no foot, but for an arm that has a task"
+    )
     com_velocity_cost: float = Field(1000.0, gt=0, description="[cost / (m/s)²] α₄, joint velocities against CoM plan")
     hand_velocity_cost: float = Field(10.0, gt=0, description="[cost / (m/s)²] α₅, joint velocities against hands")
     velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
@@ -55,7 +58,7 @@ class WholeBodySettings(StrictModel):
         0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
     )
     posture_rate: float = Field(1.0, ge=0, description="[1/s] pull of the joint velocities to the nominal posture")
-    torso_cost: float = Field(0.3, ge=0, description="[cost / (rad/s)²] of the torso's rate against its pull")
+    torso_cost: float = Field(3.0, ge=0, description="[cost / (rad/s)²] of the torso's rate against its pull")
     torso_rate: float = Field(4.0, ge=0, description="[1/s] pull of the torso to upright, or to a reach's posture")
     tracking_rate: float = Field(8.0, gt=0, description="[1/s] pull of the joint reference to its CoM, hands and feet")
 
@@ -68,6 +71,9 @@ class GaitSettings(StrictModel):
     first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
     step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
     step_width: float = Field(0.09, gt=0, description="[m] between the soles' centres when walking")
+    turning_room: float = Field(
+        0.07, ge=0, description="[m] by which that width grows with the sine of the angle between the soles"
+    )
     narrowest: float = Field(0.08, gt=0, description="[m] smallest such width")
     widest: float = Field(0.20, gt=0, description="[m] largest such width")
     longest: float = Field(0.14, gt=0, description="[m] largest distance of a foot ahead of or behind the other")

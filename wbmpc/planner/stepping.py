@@ -143,7 +143,8 @@ class Stepping:
         share = 2.0 * period if side == leading else 0.0
         yaw = float(feet.yaws[stance]) + omega * share
         # lateral and turning motion is taken by the leading foot, for two steps; the forward one by both
-        offset = np.array([vx * period, SIDE_SIGN[side] * settings.step_width + vy * share])
+        width = settings.step_width + turning_room(settings, yaw - float(feet.yaws[stance]))
+        offset = np.array([vx * period, SIDE_SIGN[side] * width + vy * share])
         half_turn = _rotation(0.5 * (float(feet.yaws[stance]) + yaw))
         position = feet.positions[stance].copy()
         position[:2] += half_turn @ offset
@@ -158,6 +159,11 @@ class Stepping:
             adaptable=settings.adapt_footsteps,
             task=self._walks[0][0],
         )
+
+
+def turning_room(settings: GaitSettings, angle: float) -> float:
+    """Width [m] that soles need besides when one is turned by `angle` [rad] against the other."""
+    return settings.turning_room * abs(float(np.sin(angle)))
 
 
 def _rotation(yaw: float) -> Vector:

@@ -60,8 +60,10 @@ class Swing:
         v[2] -= self._sinking
         return p, v, a
 
-    @property
-    def yaw(self) -> float:
-        """Heading now [rad]."""
-        s = minimum_jerk(self.sigma)[0]
-        return self.start_yaw + s * (self.step.yaw - self.start_yaw)
+    def heading(self, rate: float) -> tuple[float, float]:
+        """Yaw [rad] and its rate [rad/s] now, σ growing at `rate` [1/s]."""
+        lead = self.step.lead
+        span = 1.0 - 2.0 * lead
+        s, ds, _ = minimum_jerk((self.sigma - lead) / span)
+        turn = self.step.yaw - self.start_yaw
+        return self.start_yaw + s * turn, ds / span * rate * turn

@@ -41,6 +41,7 @@ class VelocityTasks:
     torso_jacobian: Vector  # (3, nv) angular
     torso_velocity: Vector  # (3,) [rad/s] towards upright
     posture_velocity: Vector  # (nv,) [rad/s] towards the nominal posture; base entries zero
+    posture_weight: Vector  # (nv,) factor on α₃ of each coordinate
     lower: Vector  # (nv,) [m/s, rad/s] bounds on q̇ from joint speed and position limits
     upper: Vector  # (nv,)
 
@@ -60,7 +61,7 @@ class HorizontalPlan:
 
 
 class WholeBodyStage:
-    """minimise  α₁|U|² + α₂|ΔZ|² + p|ΔZ|₁ + α₃|q̇ − q̇_posture|² + α₄|J_com q̇ − ċ|² + α₅ Σ|J_hand q̇ − V_hand|²
+    """minimise  α₁|U|² + α₂|ΔZ|² + p|ΔZ|₁ + α₃|q̇ − q̇_posture|²_W + α₄|J_com q̇ − ċ|² + α₅ Σ|J_hand q̇ − V_hand|²
                  + w_v|Ċ − V_ref|² + w_p|C − C_ref|² + w_f|F − F_ref|² + w_t|J_torso q̇ − ω_up|²
 
     over x = (U_x, U_y (N each), F − F_ref (x, y of MAX_FOOTSTEPS), q̇ (nv), ΔZ⁺, ΔZ⁻ (2N each)), subject to
@@ -203,14 +204,15 @@ class WholeBodyStage:
         H_qd[:] = w_com * (J.T @ J)
         H_qd += (tasks.hand_jacobian.T * w_hand) @ tasks.hand_jacobian
         H_qd += settings.torso_cost * (tasks.torso_jacobian.T @ tasks.torso_jacobian)
-        H_qd[np.diag_indices(self._nv)] += settings.joint_velocity_cost
+        joint_cost = settings.joint_velocity_cost * tasks.posture_weight
+        H_qd[np.diag_indices(self._nv)] += joint_cost
         wanted = state[:, 1] + tau * state[:, 2] + tasks.com_correction[:2]  # ċ_xy without jerk
         wanted_z = tasks.com_vertical_velocity + tasks.com_correction[2]
         qp.gradient[self._qd] = -(
             w_com * (J[:2].T @ wanted + J[2] * wanted_z)
             + tasks.hand_jacobian.T @ (w_hand * tasks.hand_velocity)
             + settings.torso_cost * (tasks.torso_jacobian.T @ tasks.torso_velocity)
-            + settings.joint_velocity_cost * tasks.posture_velocity
+            + joint_cost * tasks.posture_velocity
         )
         for axis in range(2):
             block = slice(axis * n, (axis + 1) * n)

@@ -97,6 +97,7 @@ class TaskStack:
         )
         target[:3] += s.swing_damping * setpoint.foot_velocity[side]
         target[3:] = s.swing_stiffness * rotation_error(desired=level, measured=kinematics.rotation(frame))
+        target[5] += s.swing_damping * setpoint.foot_yaw_rate[side]
         target -= s.swing_damping * velocity + kinematics.drift(frame)
 
     def _hand(self, kinematics: Kinematics, setpoint: Setpoint, side: int) -> None:
