@@ -139,7 +139,9 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         hand_force=np.array([[0.0, 0, 6.0], [0, 0, 0]]) if k >= 50 else np.zeros((2, 3)),
         hand_force_cap=np.zeros(2),
         hand_normal=np.tile([0.0, 0, 1], (2, 1)),
+        hand_urgency=np.zeros(2),
         hand_friction=np.full(2, 0.5),
+        arm_keep_out=np.tile([0.0, 0.0, 0.0, -np.inf], (2, 3, 1)),
     )
     command = TorqueCommand(
         torque=truth.torque,

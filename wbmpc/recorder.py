@@ -92,10 +92,12 @@ _SETPOINT: _Layout = {
     "hand_position": ((2, 3), float),
     "hand_velocity": ((2, 3), float),
     "hand_acceleration": ((2, 3), float),
+    "hand_urgency": ((2,), float),
     "hand_force": ((2, 3), float),
     "hand_force_cap": ((2,), float),
     "hand_normal": ((2, 3), float),
     "hand_friction": ((2,), float),
+    "arm_keep_out": ((2, 3, 4), float),
 }
 _COMMAND: _Layout = {
     "torque": (("j",), float),

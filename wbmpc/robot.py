@@ -45,6 +45,7 @@ class Robot:
     sole_frames: tuple[int, int]  # Pinocchio frame ids: x forward, z up, centre of the sole rectangle
     palm_frames: tuple[int, int]  # centre of the palm sphere
     shoulder_frames: tuple[int, int]  # the first joint after the torso on the way to the palm
+    elbow_frames: tuple[int, int]  # the last joint before the palm
     torso_frame: int
     imu_frame: int
     leg_joints: tuple[NDArray[np.int64], NDArray[np.int64]]  # joint indices that move each sole, from the base out
@@ -87,6 +88,7 @@ class Robot:
             sole_frames=_frames(pin_model, "sole"),
             palm_frames=palm_frames,
             shoulder_frames=(_joint_frame(pin_model, arms[0][0]), _joint_frame(pin_model, arms[1][0])),
+            elbow_frames=(_joint_frame(pin_model, arms[0][-1]), _joint_frame(pin_model, arms[1][-1])),
             torso_frame=torso_frame,
             imu_frame=pin_model.getFrameId("imu"),
             leg_joints=(_joint_indices(legs[0]), _joint_indices(legs[1])),

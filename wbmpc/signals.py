@@ -101,10 +101,12 @@ class Setpoint:
     hand_position: Vector  # (2, 3) [m] palm centre in world
     hand_velocity: Vector  # (2, 3) [m/s]
     hand_acceleration: Vector  # (2, 3) [m/s²]
+    hand_urgency: Vector  # (2,) 0 … 1: how much a moving hand may disturb the rest of the body to be in time
     hand_force: Vector  # (2, 3) [N] wanted contact force in world, zero when not in contact
     hand_force_cap: Vector  # (2,) [N] bound on the normal force, ramped: contact transitions without jumps
     hand_normal: Vector  # (2, 3) contact normal, out of the surface
     hand_friction: Vector  # (2,) planned friction coefficient
+    arm_keep_out: Vector  # (2, 3, 4) half-spaces a·x ≥ b of palm, forearm's middle and elbow; b = -inf: none
 
 
 @dataclass(frozen=True, slots=True)

@@ -49,7 +49,7 @@ def cost_and_violation(problem: Problem, plan: HorizontalPlan) -> float:
     squares = [
         (s.jerk_cost, plan.jerk),
         (s.delta_z_cost, plan.delta_z),
-        (s.joint_velocity_cost, plan.joint_velocity - t.posture_velocity),
+        (s.joint_velocity_cost, (plan.joint_velocity - t.posture_velocity) * np.sqrt(t.posture_weight)),
         (s.com_velocity_cost, com_error),
         (s.hand_velocity_cost, hand_error * np.sqrt(t.hand_active)[:, None]),
         (problem.urgency * s.velocity_cost, plan.velocity - support.com_velocity),
@@ -161,7 +161,8 @@ def reference(problem: Problem, *, ask_shift: bool) -> tuple[Vector, float, dict
         qp.soft_bound(terms, *bounds, s.foot_slack_cost)
 
     qd = qp.variables(ROBOT.nv)
-    qp.cost([(qd, np.eye(ROBOT.nv))], t.posture_velocity, s.joint_velocity_cost)
+    for joint, weight in enumerate(t.posture_weight):
+        qp.cost([(_one(qd, joint), np.eye(1))], t.posture_velocity[joint], s.joint_velocity_cost * weight)
     for row in range(3):
         terms = [(qd, t.com_jacobian[row : row + 1])]
         wanted = t.com_correction[row] + t.com_vertical_velocity
@@ -344,7 +345,7 @@ def test_a_known_force_lets_the_com_past_the_toes() -> None:
 
 
 def test_a_footstep_goes_where_the_capture_point_is() -> None:
-    """Herdt: pushed sideways on one foot, the next footstep is put further out, and all the more the harder the push."""
+    """Herdt: pushed sideways on one foot, the next footstep goes further out, the more the harder the push."""
     shifts = [solve(pushed(speed)).footstep_shift[0, 1] for speed in (0.2, 0.3, 0.4)]
     assert np.diff(shifts).min() > 0.05
     assert max(solve(pushed(0.3, adaptable=False)).footstep_shift.ravel()) == 0.0

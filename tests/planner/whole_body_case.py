@@ -65,6 +65,7 @@ def velocity_tasks(rng: np.random.Generator | None = None) -> VelocityTasks:
         torso_jacobian=kinematics.jacobian(ROBOT.torso_frame)[3:],
         torso_velocity=random(3, 0.2),
         posture_velocity=np.concatenate([np.zeros(6), random(nj, 0.3)]),
+        posture_weight=np.ones(6 + nj) if rng is None else rng.uniform(0.5, 30.0, 6 + nj),
         lower=np.concatenate([np.full(6, -5.0), np.full(nj, -3.0) if rng is None else rng.uniform(-3.0, 0.0, nj)]),
         upper=np.concatenate([np.full(6, 5.0), np.full(nj, 3.0) if rng is None else rng.uniform(0.0, 3.0, nj)]),
     )
@@ -103,7 +104,7 @@ def random_problem(seed: int, *, walking: bool) -> Problem:
 
 
 def _footsteps(rng: np.random.Generator) -> SupportPreview:
-    """Left and right by turns, three knots each on one foot, then two on both: any numbers will do, no gait is asked."""
+    """Left and right by turns, three knots each on one foot, then two on both: any numbers will do."""
     m = MAX_FOOTSTEPS
     places = np.column_stack([0.04 * np.arange(m + 1), np.where(np.arange(m + 1) % 2, -0.045, 0.045)])
     places += rng.uniform(-0.01, 0.01, places.shape)

@@ -8,6 +8,7 @@ import numpy as np
 
 from wbmpc.planner.contact_choice import ContactChoice, Option
 from wbmpc.planner.contact_force import Need
+from wbmpc.planner.pace import hurried, way_time
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
@@ -78,7 +79,14 @@ class Candidates:
         return min(palm, com)
 
     def choose(
-        self, need: Need, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon
+        self,
+        need: Need,
+        *,
+        palms: Vector,
+        free_hands: list[bool],
+        held: list[Option],
+        polygon: SupportPolygon,
+        urgency: float,
     ) -> tuple[list[Candidate], tuple[CandidateReport, ...], StageReport]:
         """Stage 3 for a need of ContactChoice.KNOTS knots.
 
@@ -87,13 +95,16 @@ class Candidates:
             free_hands: which hands may take a contact.
             held: contacts taken before, which keep their share of the load.
             polygon: where the CoM may be before a new contact carries load.
+            urgency: 0 … 1, the alarm: a hand that would come too late is out of the question.
 
         Returns:
             The candidates to take (none: none can help), a report on every candidate, and the MIQP's own report.
         """
         if self._choice is None:
             return [], (), StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
-        distances, reasons = self._sort_out(palms=palms, free_hands=free_hands, held=held, polygon=polygon)
+        distances, reasons = self._sort_out(
+            palms=palms, free_hands=free_hands, held=held, polygon=polygon, urgency=urgency
+        )
         considered = [c for c in self.all if id(c) not in reasons]
         considered.sort(key=lambda candidate: distances[id(candidate)])
         room = self._slots - len(held)
@@ -138,7 +149,13 @@ class Candidates:
         return self._given.solve(need, [replace(contact, held=True) for contact in contacts], left=self._left).objective
 
     def _sort_out(
-        self, *, palms: Vector, free_hands: list[bool], held: list[Option], polygon: SupportPolygon
+        self,
+        *,
+        palms: Vector,
+        free_hands: list[bool],
+        held: list[Option],
+        polygon: SupportPolygon,
+        urgency: float,
     ) -> tuple[dict[int, float], dict[int, str]]:
         """Way of the palm to each candidate [m], and why some are out of the question; both by id of the candidate."""
         distances: dict[int, float] = {}
@@ -157,6 +174,11 @@ class Candidates:
                 reasons[key] = "tried before, nothing was there"
             elif slack < 0.0:
                 reasons[key] = f"unreachable by {-100.0 * slack:.1f} cm"
+            elif (
+                hurried(urgency)
+                and (late := way_time(self._settings, distances[key]) - self._settings.urgent_time) > 0.0
+            ):
+                reasons[key] = f"there {1e3 * late:.0f} ms too late"
         return distances, reasons
 
     def _cost_of(self, need: Need, option: Option, company: list[Option]) -> tuple[float, Vector]:

@@ -49,6 +49,20 @@ class ComHeightStage:
         self._workspace = make_workspace(backend, self.problem)
         self._fresh = True
 
+    def plan(self, state: Vector, *, wanted: Vector, band: Vector, plane: float) -> tuple[HeightPlan, QpSolution]:
+        """`solve` within the legs' range over the feet at `plane` [m]; the height stays when it fails or is turned off.
+
+        `state` (3,) is brought to rest in that case.
+        """
+        settings, steps = self._settings, self._preview.steps
+        limits = np.tile([plane + settings.lowest, plane + settings.highest], (steps, 1))
+        plan, solution = self.solve(state, wanted=wanted, limits=limits, band=band)
+        if plan is None or not settings.enabled:
+            state[1:] = 0.0
+            zero = np.zeros(steps)
+            plan = HeightPlan(zero, np.full(steps, state[0]), zero, zero)
+        return plan, solution
+
     def solve(
         self, state: Vector, *, wanted: Vector, limits: Vector, band: Vector
     ) -> tuple[HeightPlan | None, QpSolution]:

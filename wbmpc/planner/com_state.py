@@ -8,6 +8,8 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.signals import GRAVITY, Vector
 
 ALARM_TIME = 0.6  # [s] in which an alarm wears off
+PUSH_TIME = 0.05  # [s] for which a push that is felt now is taken to go on
+PUSH_SHARE = 0.5  # per plan, of the felt push
 VELOCITY_SHARE = 0.6  # per plan: a filter of about 15 Hz at 100 plans a second
 
 
@@ -26,6 +28,18 @@ class ComState:
         self.value[:, 0] = com
         self.alarm = 0.0
         self._velocity = np.zeros(3)
+        self._before = np.zeros(2)  # [m/s] the velocity at the last plan
+        self._push = np.zeros(2)  # [m/s²] measured acceleration that no plan has asked for
+
+    @property
+    def anticipated(self) -> Vector:
+        """The state (3, 3) with the velocity that a push leads to if it goes on for PUSH_TIME; without alarm `value`.
+
+        A hand takes longer to its contact than a push lasts: whether it is needed cannot wait for the push's end.
+        """
+        ahead = self.value.copy()
+        ahead[:2, 1] += self.alarm * PUSH_TIME * self._push
+        return ahead
 
     def filter(self, velocity: Vector) -> None:
         """Take in a measured CoM velocity (3,) [m/s]."""
@@ -38,6 +52,9 @@ class ComState:
         self.value = planned
         if not np.isfinite(measured).all():
             return
+        felt = (self._velocity[:2] - self._before) / self._period - planned[:2, 2]
+        self._push += PUSH_SHARE * (felt - self._push)
+        self._before = self._velocity[:2].copy()
         position_error = measured[:2] - planned[:2, 0]
         velocity_error = self._velocity[:2] - planned[:2, 1]
         omega = np.sqrt(GRAVITY / max(height, 0.05))

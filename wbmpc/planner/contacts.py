@@ -48,8 +48,11 @@ class Contacts:
         self._needed, self._quiet = False, True  # of the shift as a whole
         self._short = False  # the contacts there are cannot give it
         self._spare: int | None = None  # side of the contact that the other hand's can do without
+        self._spent: tuple[int, ...] = ()  # sides of contacts out of reach of what comes next
         self._hopeless = 0.0  # [s] that no candidate has been able to help
         self._since_review = RETRY_PLANS
+        self._palm_velocities = np.zeros((len(SIDES), 3))  # [m/s] measured at the last plan
+        self._urgency = 0.0  # 0 … 1, at the last plan
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -61,6 +64,11 @@ class Contacts:
         awaited = any(c.busy and c.expected for c in self.hands)
         carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self.hands)
         return (carried or self._hopeless >= GIVE_UP_TIME) and not awaited
+
+    @property
+    def leaving(self) -> bool:
+        """Whether a contact is being given up: a foot that lifts now would need it, or trip over it."""
+        return any(c.phase in (ContactPhase.QUIET, ContactPhase.UNLOADED) for c in self.hands)
 
     @property
     def points(self) -> list[Vector | None]:
@@ -98,17 +106,33 @@ class Contacts:
         if all(palm is not None for palm in palms):
             self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
-    def advance(self, dt: float, *, palms: Vector, palm_forces: Vector, homes: Vector, events: list[str]) -> None:
-        """Every contact's life one plan further, with measured palms (2, 3) [m] and forces (2, 3) [N]."""
+    def advance(
+        self,
+        dt: float,
+        *,
+        palms: Vector,
+        palm_velocities: Vector,
+        palm_forces: Vector,
+        homes: Vector,
+        urgency: float,
+        events: list[str],
+    ) -> None:
+        """Every contact's life one plan further, with measured palms (2, 3) [m, m/s] and forces (2, 3) [N].
+
+        `urgency` 0 … 1 is the alarm that a push has sounded.
+        """
+        self._palm_velocities, self._urgency = palm_velocities, urgency
         for contact in self.hands:
             side, before, patch = contact.side, contact.phase, self.name(contact.side)
             outcome = contact.advance(
                 dt,
                 palm=palms[side],
+                palm_velocity=palm_velocities[side],
                 force=palm_forces[side],
                 wanted_force=float(self.forces[side, 0] @ contact.patch.normal) if contact.patch else 0.0,
-                needed=self._needed and side != self._spare,
-                quiet=self._quiet or side == self._spare,
+                needed=self._needed and side != self._spare and side not in self._spent,
+                quiet=self._quiet or side == self._spare or side in self._spent,
+                urgency=urgency,
                 home=homes[side],
             )
             if outcome == "failed":
@@ -129,6 +153,7 @@ class Contacts:
         palms: Vector,
         hand_taken: list[bool],
         polygon: SupportPolygon,
+        spent: tuple[int, ...],
         events: list[str],
     ) -> tuple[tuple[CandidateReport, ...], StageReport]:
         """Judge the need, choose contacts when those there are do not do, and plan the forces of those that touch.
@@ -139,10 +164,12 @@ class Contacts:
             palms: (2, 3) measured [m].
             hand_taken: hands that a task uses.
             polygon: where the CoM may be before a contact carries load.
+            spent: sides of contacts that the task's end leaves out of reach: they make room for others.
 
         Returns:
             A report on every candidate when stage 3 fired (else empty), and stage 3's own report.
         """
+        self._spent = spent
         shift = float(np.abs(need.delta_z).max())
         if binding and goal is not None:
             shift = max(shift, float(np.abs(goal.delta_z).max()))
@@ -172,7 +199,7 @@ class Contacts:
     def _committed(self) -> list[HandContact]:
         """The contacts that are there or on their way, those that are being released left out."""
         leaving = (ContactPhase.UNLOADED, ContactPhase.RELEASED)
-        return [c for c in self.hands if c.busy and c.phase not in leaving]
+        return [c for c in self.hands if c.busy and c.phase not in leaving and c.side not in self._spent]
 
     def _worst_knots(self, need: Need, goal: Need | None) -> Need:
         """Two knots to choose for: the largest shift in the horizon, and the task's end or the largest sideways.
@@ -209,7 +236,7 @@ class Contacts:
         """Stage 3's choice of what joins the committed contacts."""
         held = _options(self._committed)
         winners, reports, stage = self.candidates.choose(
-            knots, palms=palms, free_hands=free, held=held, polygon=polygon
+            knots, palms=palms, free_hands=free, held=held, polygon=polygon, urgency=self._urgency
         )
         chosen = " and ".join(f"{w.patch.name} for the {SIDES[w.hand]} hand" for w in winners)
         size = 1e3 * np.abs(knots.delta_z[0]).max()
@@ -218,7 +245,9 @@ class Contacts:
             f"stage 3 fired: |ΔZ| {size:.1f} mm{beside}, {f'chose {chosen}' if chosen else 'no candidate helps'}"
         )
         for winner in winners:
-            self.hands[winner.hand].choose(winner.patch, palm=palms[winner.hand])
+            self.hands[winner.hand].choose(
+                winner.patch, palm=palms[winner.hand], palm_velocity=self._palm_velocities[winner.hand]
+            )
             self._hopeless, self._short = 0.0, False
         return reports, stage
 

@@ -24,7 +24,7 @@ class Footstep:
     task: int  # index of the task that asks for it
 
     def share(self, sigma: Vector) -> Vector:
-        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time; minimum jerk between leads."""
+        """Share (n,) of the horizontal way done at `sigma` (n,), shares of the swing time: minimum jerk."""
         phase = np.clip((sigma - self.lead) / (1.0 - 2.0 * self.lead), 0.0, 1.0)
         return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
 

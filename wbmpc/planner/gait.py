@@ -97,7 +97,8 @@ class Gait:
                 self.phase, self.step = SupportPhase.STAND, None
                 return
             if self.phase == SupportPhase.STAND:
-                self.phase, self._left = SupportPhase.DOUBLE, settings.first_double_support
+                self.phase = SupportPhase.DOUBLE
+                self._left = max(settings.first_double_support, wanted.double_support)
             self.step = wanted
             self._left -= rate * dt
             if self._left <= 1e-9:

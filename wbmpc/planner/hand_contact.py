@@ -6,14 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from wbmpc.planner.hand_path import HandPath
+from wbmpc.planner.hand_path import HandPath, Landing
+from wbmpc.planner.pace import Pace
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import ContactPhase, HandMode, Vector
 
-ARRIVED = 0.012  # [m] palm error at the clearance point below which the descent begins
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
+
+STOPPED_HEIGHT, STOPPED_SPEED = 0.012, 0.05  # [m], [m/s] a palm slower than this so near has touched
+STANDOFF = 0.004  # [m] above the surface at which it has its landing speed
+SHORTEST = 0.4  # [s] least time of a careful approach
+LAST_AIM = 0.03  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
 TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
 
@@ -36,6 +41,9 @@ class HandContact:
         self._sigma, self._duration, self._rate = 0.0, 1.0, 1.0
         self._touched = np.zeros(3)
         self._unloaded_clock = 0.0
+        self._urgency = 0.0  # 0 … 1, now
+        self._pace = Pace.of(settings, 0.0)  # of the present approach
+        self._landing: Landing | None = None  # an urgent approach, as aimed at the last plan
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -67,6 +75,11 @@ class HandContact:
         return HandMode.MOVE if self.busy else HandMode.FREE
 
     @property
+    def hurried(self) -> bool:
+        """Whether the palm is on an urgent way to its patch."""
+        return self.phase in (ContactPhase.CHOSEN, ContactPhase.APPROACHING) and self._pace.hurried
+
+    @property
     def goal(self) -> Vector | None:
         """Palm position (3,) of the contact in world [m]; None when there is none to reach or hold."""
         if self.patch is None or self.phase == ContactPhase.RELEASED:
@@ -80,13 +93,15 @@ class HandContact:
             return self._touched, zero, zero
         assert self._path is not None
         assert self.patch is not None
+        if self._landing is not None and self.hurried:
+            position, velocity, acceleration = self._landing.at(0.0)
+            return position, velocity, self._possible(acceleration)
         if self._descent >= 0.0:
-            settings = self._settings
-            moving = self._descent < settings.approach_clearance + settings.search_depth
+            moving = self._descent < self._pace.clearance + self._settings.search_depth
             normal = self.patch.normal
             return (
                 self._path.end - self._descent * normal,
-                -settings.touch_speed * normal if moving else zero,
+                -self._pace.touch_speed * normal if moving else zero,
                 zero,
             )
         p, dp, ddp = self._path.at(self._sigma)
@@ -94,6 +109,8 @@ class HandContact:
 
     def preview(self, times: Vector) -> Vector:
         """Palm references (n, 3) [m] at `times` (n,) seconds from now, while there is a goal to reach or hold."""
+        if self._landing is not None and self.hurried:
+            return np.array([self._landing.at(min(t, self._landing.duration))[0] for t in times])
         if self.touching or self._path is None or self._descent >= 0.0:
             return np.tile(self.reference()[0], (len(times), 1))
         return self._path.positions(np.clip(self._sigma + self._rate * times, 0.0, 1.0))
@@ -102,20 +119,30 @@ class HandContact:
         """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
         if not self.touching or self.patch is None:
             return np.zeros(len(times))
-        slope = (-1.0 if self.phase == ContactPhase.UNLOADED else 1.0) / self._settings.ramp_time
+        unloading = self.phase == ContactPhase.UNLOADED
+        slope = -1.0 / self._settings.ramp_time if unloading else 1.0 / self._pace.ramp_time
         return self.patch.force_cap * np.clip(self._level + slope * times, 0.0, 1.0)
 
     # ------------------------------------------------------------------ the life
 
-    def choose(self, patch: PatchPose, *, palm: Vector) -> None:
-        """Stage 3 has chosen `patch`; the palm is at `palm` (3,)."""
+    def choose(self, patch: PatchPose, *, palm: Vector, palm_velocity: Vector) -> None:
+        """Stage 3 has chosen `patch`; the palm is at `palm` (3,) [m] and moves with `palm_velocity` (3,) [m/s]."""
         self.patch = patch
-        settings = self._settings
-        clearance = patch.position + (self._radius + settings.approach_clearance) * patch.normal
+        pace = self._pace = Pace.of(self._settings, self._urgency)
+        clearance = patch.position + (self._radius + pace.clearance) * patch.normal
         self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)
-        self._duration = max(0.4, float(np.linalg.norm(clearance - palm)) / settings.approach_speed)
+        self._duration = max(SHORTEST, float(np.linalg.norm(clearance - palm)) / self._settings.approach_speed)
         self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
         self._enter(ContactPhase.CHOSEN)
+        self._landing = None
+        if pace.hurried:
+            self._duration = Landing.shortest(
+                way=clearance - palm,
+                velocity=palm_velocity,
+                arrival=-pace.touch_speed * patch.normal,
+                acceleration=self._settings.urgent_acceleration,
+            )
+            self._aim(palm, palm_velocity)
 
     def release(self, *, palm: Vector, home: Vector) -> None:
         """Leave the surface (or give the approach up): lift along the normal and return to `home` (3,)."""
@@ -131,31 +158,48 @@ class HandContact:
             self.phase = ContactPhase.NEEDED if needed else ContactPhase.NONE
 
     def advance(
-        self, dt: float, *, palm: Vector, force: Vector, wanted_force: float, needed: bool, quiet: bool, home: Vector
+        self,
+        dt: float,
+        *,
+        palm: Vector,
+        palm_velocity: Vector,
+        force: Vector,
+        wanted_force: float,
+        needed: bool,
+        quiet: bool,
+        urgency: float,
+        home: Vector,
     ) -> str | None:
         """One plan later.
 
         Args:
             dt: since the last call [s].
             palm: measured palm position (3,) [m].
+            palm_velocity: measured (3,) [m/s].
             force: measured palm force (3,) [N].
             wanted_force: normal force that the plan asks for now [N].
             needed: whether stage 2 still asks for a shift.
             quiet: whether the asked shift is negligible over the whole horizon.
+            urgency: how soon a contact is needed, 0 … 1: the planner's alarm.
             home: where the palm returns to (3,) [m].
 
         Returns:
             "failed" when the expected contact was not found and the candidate must be given up, else None.
         """
+        self._urgency = urgency
         if not self.busy or self.patch is None:
             return None
         settings, phase = self._settings, self.phase
         self._clock += dt
         normal_force = float(force @ self.patch.normal)
         if phase == ContactPhase.CHOSEN:
-            self._enter(ContactPhase.APPROACHING)
-        elif phase == ContactPhase.APPROACHING:
-            return self._approach(dt, palm=palm, normal_force=normal_force, needed=needed, home=home)
+            phase = self.phase = ContactPhase.APPROACHING  # the clock goes on
+        if phase == ContactPhase.APPROACHING:
+            if self._landing is not None and normal_force <= settings.sensed_force:
+                self._aim(palm, palm_velocity)
+            return self._approach(
+                dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home
+            )
         elif phase == ContactPhase.RELEASED:
             if self._path is not None:  # the torso moves on while the hand is on its way
                 self._path = replace(self._path, start=home.copy())
@@ -170,7 +214,7 @@ class HandContact:
             elif self._level <= 0.0:
                 self.release(palm=palm, home=home)
         else:
-            self._level = min(1.0, self._level + dt / settings.ramp_time)
+            self._level = min(1.0, self._level + dt / self._pace.ramp_time)
             if phase == ContactPhase.SENSED and self._level >= 1.0:
                 self._enter(ContactPhase.LOADED)
             elif phase == ContactPhase.LOADED and quiet:
@@ -187,36 +231,68 @@ class HandContact:
                 self._descend_again(palm)
         return None
 
-    def _approach(self, dt: float, *, palm: Vector, normal_force: float, needed: bool, home: Vector) -> str | None:
+    def _approach(
+        self, dt: float, *, palm: Vector, palm_velocity: Vector, normal_force: float, needed: bool, home: Vector
+    ) -> str | None:
         settings = self._settings
         assert self.patch is not None
         assert self._path is not None
         if not needed and self._clock > 0.5:
             self.release(palm=palm, home=home)
             return None
-        if self._descent < 0.0:
-            self._sigma = min(1.0, self._sigma + self._rate * dt)
-            if self._sigma >= 1.0:
-                if np.linalg.norm(palm - self._path.end) < ARRIVED:
-                    self._descent = 0.0
-                elif self._clock > self._duration + PATIENCE:
-                    return "failed"
-            return None
-        if normal_force > settings.sensed_force:
+        sensed = normal_force > settings.sensed_force and (self._descent >= 0.0 or self.hurried)
+        if sensed or (self.hurried and self._stopped(palm, palm_velocity)):
             self._touched = palm.copy()
             self._level, self._unloaded_clock = 0.0, 0.0
             self._enter(ContactPhase.SENSED)
             return None
-        depth = settings.approach_clearance + settings.search_depth
+        if self._descent < 0.0:
+            self._sigma = min(1.0, self._sigma + self._rate * dt)
+            if self._sigma >= 1.0:
+                if np.linalg.norm(palm - self._path.end) < self._pace.arrived:
+                    self._descent = 0.0
+                elif self._clock > self._duration + PATIENCE:
+                    return "failed"
+            return None
+        depth = self._pace.clearance + settings.search_depth
         if self._descent >= depth:
             return "failed"
-        self._descent = min(depth, self._descent + settings.touch_speed * dt)
+        self._descent = min(depth, self._descent + self._pace.touch_speed * dt)
         return None
+
+    def _stopped(self, palm: Vector, palm_velocity: Vector) -> bool:
+        """Whether something has stopped a palm that was to meet the surface in motion: a bounce between two plans."""
+        assert self.patch is not None
+        height = float((palm - self.patch.position) @ self.patch.normal) - self._radius
+        late = self._clock > 0.5 * self._duration
+        return late and height < STOPPED_HEIGHT and float(palm_velocity @ self.patch.normal) > -STOPPED_SPEED
+
+    def _aim(self, palm: Vector, palm_velocity: Vector) -> None:
+        """Aim an urgent approach anew from where the palm is; near the surface only its speed is still corrected."""
+        assert self.patch is not None
+        normal = self.patch.normal
+        arrival = -self._pace.touch_speed * normal
+        left = self._duration - self._clock
+        height = STANDOFF if left > 0.0 else -0.5 * self._settings.search_depth
+        end = self.patch.position + (self._radius + height) * normal
+        left = max(left, LAST_AIM)
+        self._landing = Landing(
+            start=palm.copy(), velocity=palm_velocity.copy(), end=end, arrival=arrival, duration=left, normal=normal
+        )
+
+    def _possible(self, acceleration: Vector) -> Vector:
+        """What an arm can give of a wanted acceleration (3,) [m/s²]: meeting the surface softly comes before where."""
+        assert self.patch is not None
+        normal, most = self.patch.normal, self._settings.urgent_acceleration
+        along = float(acceleration @ normal)
+        across = acceleration - along * normal
+        across *= min(1.0, most / max(float(np.linalg.norm(across)), 1e-9))
+        return across + min(max(along, -1.5 * most), 1.5 * most) * normal
 
     def _descend_again(self, palm: Vector) -> None:
         assert self.patch is not None
-        settings = self._settings
-        start = palm + 0.3 * settings.approach_clearance * self.patch.normal
+        self._pace = Pace.of(self._settings, self._urgency)
+        start = palm + 0.3 * self._pace.clearance * self.patch.normal
         self._path = HandPath(start=start, end=start, away=self.patch.normal)
         self._descent, self._level, self._unloaded_clock = 0.0, 0.0, 0.0
         self._enter(ContactPhase.APPROACHING)

@@ -64,3 +64,50 @@ class HandPath:
             phase = np.minimum(np.maximum((sigmas - begin) / (finish - begin), 0.0), 1.0)
             p += (phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2))[:, None] * part
         return p
+
+
+@dataclass(frozen=True, slots=True)
+class Landing:
+    """The way of least ∫|a|² from a palm in motion onto a surface that it meets at a given velocity: a cubic in time.
+
+    Made anew at every plan from the measured palm this is terminal guidance: whatever the falling body does to the
+    hand on its way, it arrives in time and no faster than it should. After `duration` it goes on at `arrival`.
+    """
+
+    start: Vector  # (3,) [m] in world
+    velocity: Vector  # (3,) [m/s] at the start
+    end: Vector  # (3,) [m]
+    arrival: Vector  # (3,) [m/s] at the end
+    duration: float  # [s] > 0
+    normal: Vector | None = None
+
+    @staticmethod
+    def shortest(*, way: Vector, velocity: Vector, arrival: Vector, acceleration: float) -> float:
+        """Shortest duration [s] in which neither end asks for more than `acceleration` [m/s²] along the way (3,) [m].
+
+        Along the way, a(0) T² = 6 d − (4 v₀ + 2 v₁) T and −a(T) T² = 6 d − (2 v₀ + 4 v₁) T.
+        """
+        d = float(np.linalg.norm(way))
+        if d < 1e-9:
+            return 0.0
+        v0, v1 = float(velocity @ way) / d, float(arrival @ way) / d
+        halves = (2.0 * v0 + v1, v0 + 2.0 * v1)
+        return max(float(np.sqrt(h * h + 6.0 * d * acceleration) - h) / acceleration for h in halves)
+
+    def at(self, time: float) -> tuple[Vector, Vector, Vector]:
+        """Position (3,) [m], velocity [m/s] and acceleration [m/s²] at `time` [s]."""
+        T = self.duration
+        if time >= T:
+            return self.end + (time - T) * self.arrival, self.arrival, np.zeros(3)
+        way = (self.end - self.start) / T
+        end_velocity = self.arrival
+        if self.normal is not None:  # free across the normal: 1.5 way − 0.5 v₀ ends without acceleration
+            free = 1.5 * way - 0.5 * self.velocity
+            end_velocity = self.arrival + free - float(free @ self.normal) * self.normal
+        a = (6.0 * way - 4.0 * self.velocity - 2.0 * end_velocity) / T
+        jerk = 6.0 * (self.velocity + end_velocity - 2.0 * way) / T**2
+        return (
+            self.start + time * (self.velocity + time * (a / 2.0 + time * jerk / 6.0)),
+            self.velocity + time * (a + time * jerk / 2.0),
+            a + time * jerk,
+        )

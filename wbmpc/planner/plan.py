@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.whole_body import HorizontalPlan
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
 
@@ -36,12 +38,14 @@ class Plan:
     hand_position: Vector  # (2, 3) [m]
     hand_velocity: Vector  # (2, 3) [m/s]
     hand_acceleration: Vector  # (2, 3) [m/s²]
+    hand_urgency: Vector  # (2,) 0 … 1
     hand_force: Vector  # (2, 3) [N]
     hand_force_cap: Vector  # (2,) [N] at the snapshot
     hand_force_cap_rate: Vector  # (2,) [N/s]
     hand_force_cap_top: Vector  # (2,) [N]
     hand_normal: Vector  # (2, 3)
     hand_friction: Vector  # (2,)
+    arm_keep_out: Vector  # (2, 3, 4)
     report: PlanReport
 
     def com_state(self, time: float) -> Vector:
@@ -86,10 +90,32 @@ class Plan:
             hand_position=self.hand_position + dt * self.hand_velocity + dt**2 / 2 * self.hand_acceleration,
             hand_velocity=going * (self.hand_velocity + dt * self.hand_acceleration),
             hand_acceleration=going * self.hand_acceleration,
+            hand_urgency=self.hand_urgency,
             hand_force=self.hand_force,
             hand_force_cap=np.minimum(
                 np.maximum(self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0), self.hand_force_cap_top
             ),
             hand_normal=self.hand_normal,
             hand_friction=self.hand_friction,
+            arm_keep_out=self.arm_keep_out,
         )
+
+
+def com_course(now: Vector, motion: HorizontalPlan | None, height: HeightPlan) -> tuple[Vector, Vector]:
+    """CoM states (N + 1, 3 axes, 3) now and at every knot, and jerks (N, 3), of what stages 1 and 2 have planned.
+
+    Args:
+        now: (3, 3) c, ċ, c̈ per axis [m, m/s, m/s²].
+        motion: None when stage 2 has failed: the CoM stays where it is, with its velocity as reference.
+        height: stage 1's answer.
+    """
+    n = len(height.jerk)
+    states, jerk = np.empty((n + 1, 3, 3)), np.zeros((n, 3))
+    states[0] = now
+    jerk[:, 2] = height.jerk
+    states[1:, 2] = np.column_stack([height.height, height.velocity, height.acceleration])
+    states[1:, :2] = now[:2]
+    if motion is not None:
+        jerk[:, :2] = motion.jerk
+        states[1:, :2] = np.stack([motion.com, motion.velocity, motion.acceleration], axis=2)
+    return states, jerk

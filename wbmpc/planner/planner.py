@@ -7,29 +7,30 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.kinematics import Kinematics
+from wbmpc.planner.assembly import assemble
 from wbmpc.planner.bands import height_band
-from wbmpc.planner.com_height import ComHeightStage, HeightPlan
+from wbmpc.planner.com_height import ComHeightStage
 from wbmpc.planner.com_state import ComState
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.footholds import Footholds
-from wbmpc.planner.footstep import Feet, SoleReferences
+from wbmpc.planner.footstep import Feet
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
-from wbmpc.planner.plan import Plan
+from wbmpc.planner.keep_out import KeepOut
+from wbmpc.planner.plan import Plan, com_course
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.references import References
 from wbmpc.planner.settings import PlannerSettings
+from wbmpc.planner.snapshot import Snapshot
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
-from wbmpc.rotations import heading_of
 from wbmpc.scenario import Obstacle, PatchPose, Task
-from wbmpc.signals import SIDES, CandidateReport, HandMode, PlanReport, RobotState, StageReport, Vector
+from wbmpc.signals import SIDES, CandidateReport, PlanReport, RobotState, StageReport, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
@@ -59,32 +60,28 @@ class Planner:
         period: float,
     ) -> None:
         """Start from rest at configuration `q` (nq,); `period` is the time between two plans [s]."""
-        self._robot, self._settings, self._period = robot, settings, period
+        self._robot, self._settings, self._period, self._keep_out = robot, settings, period, KeepOut(obstacles)
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
         self._need_stage, self._motion_stage = (
             WholeBodyStage(self._preview, robot.nv, settings.whole_body, backend=settings.qp_backend, ask_shift=ask)
             for ask in (True, False)
         )
-        measured = self._measured = Kinematics(robot)
-        measured.update_kinematics(q)
+        measured = self._measured = Snapshot(robot, q)
         stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
-        self._gait = Gait(settings.gait, stepping, soles=self._measured_soles(), yaws=self._measured_yaws())
+        self._gait = Gait(settings.gait, stepping, soles=measured.soles, yaws=measured.sole_yaws)
         self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
-        self._palms = np.array([measured.position(f) for f in robot.palm_frames])
-        self._palm_homes = self._in_torso(self._palms)  # where free hands hang
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
         self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
-        self._references = References(robot, tasks, q=q, palms=self._palms, height=float(measured.com[2]), times=times)
+        self._references = References(
+            robot, tasks, q=q, palms=measured.palms, height=float(measured.com[2]), times=times
+        )
         self._joints = JointReference(robot, settings.whole_body, q=q)
         self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
         self._last: Plan | None = None
-        self._time, self._elapsed = (
-            0.0,
-            period,
-        )  # [s] of the last snapshot, and since it: longer when a plan was skipped
+        self._time, self._elapsed = 0.0, period  # [s] of the last snapshot, since it: longer after a skipped plan
 
     def solve(self, state: RobotState) -> Plan:
         """Plan from a snapshot. A failed solve keeps the last plan (or stands still) and says so in the report."""
@@ -93,26 +90,25 @@ class Planner:
         settings, preview, contacts, references = self._settings, self._preview, self._contacts, self._references
         self._observe(state)
         self._advance(state, events)
-        at_once, gated_support = self._supports(state.time)
+        judged, gated_support = self._supports(state.time)
         polygon = gated_support.polygons[0]
         plane = polygon.plane_height
         mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
 
         stride, times = self._gait.stride, preview.times
-        full_pace, full_sigma = references.palms(state.time, contacts, pace=1.0)
+        full_pace, full_sigma = references.palms(state.time, None, pace=1.0)
         gated, sigma = references.palms(state.time, contacts)
         foot, gated_foot = np.zeros(preview.steps), np.zeros(preview.steps)
         if stride is not None:
             foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        height, solution = self._plan_height(
-            references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)), band, plane
-        )
+        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot))
+        height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
-        hands = references.hand_targets(contacts, self._palms)
+        hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
@@ -128,10 +124,10 @@ class Planner:
         urgency = 1.0 + alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
-            stage: WholeBodyStage, zmp: ZmpModel, support: SupportPreview, com_band: Vector
+            stage: WholeBodyStage, com: Vector, zmp: ZmpModel, support: SupportPreview, com_band: Vector
         ) -> tuple[HorizontalPlan | None, QpSolution]:
             return stage.solve(
-                self._com.value[:2],
+                com[:2],
                 zmp=zmp,
                 support=support,
                 com_band=com_band,
@@ -145,26 +141,25 @@ class Planner:
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
         if settings.contact_stage:
-            wish, _ = stage_2(
-                self._need_stage, model, at_once, references.com_band(contacts, full_pace, full_sigma, foot)
-            )
+            full_band = references.com_band(contacts, full_pace, full_sigma, foot)
+            wish, _ = stage_2(self._need_stage, self._com.anticipated, model, judged, full_band)
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
-                    need_of(wish, height, model, polygons=at_once.polygons, mass=mass, exact=exact),
+                    need_of(wish, height, model, polygons=judged.polygons, mass=mass, exact=exact),
                     goal=self._goal_need(mass),
                     binding=stride is not None,
-                    palms=self._palms,
+                    palms=self._measured.palms,
                     hand_taken=references.hands_taken(),
-                    polygon=polygon,
+                    polygon=judged.polygons[0],
+                    spent=references.spent(contacts),
                     events=events,
                 )
         forces = contacts.forces
         if forces.any():
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        motion, solution = stage_2(
-            self._motion_stage, model, gated_support, references.com_band(contacts, gated, sigma, gated_foot)
-        )
+        com_band = references.com_band(contacts, gated, sigma, gated_foot)
+        motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
         stage2 = _stage_report(solution, begin)
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
@@ -189,15 +184,30 @@ class Planner:
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
-        self._last = self._make_plan(motion, height, hands, soles, report)
+        if motion is None and self._last is not None:
+            self._last = replace(self._last, report=report)
+            return self._last
+        arms = self._keep_out.half_spaces(self._measured.arm_points.reshape(-1, 3)).reshape(len(SIDES), -1, 4)
+        self._last = assemble(
+            report,
+            step=preview.step,
+            period=self._period,
+            course=com_course(self._com.value, motion, height),
+            velocity=motion.joint_velocity if motion is not None else np.zeros(self._robot.nv),
+            joints=self._joints,
+            stance=self._gait.stance,
+            soles=soles,
+            modes=[mode for _, _, mode in hands],
+            contacts=contacts.hands,
+            arm_keep_out=arms,
+        )
         return self._last
 
     # ------------------------------------------------------------------ steps of one plan
 
     def _observe(self, state: RobotState) -> None:
         """Take in what was measured; continue the planned state to now."""
-        self._measured.update(state.q, state.v)
-        self._palms = np.array([self._measured.position(f) for f in self._robot.palm_frames])
+        self._measured.update(state)
         self._com.filter(self._measured.com_velocity)
         if self._last is not None:
             self._elapsed = state.time - self._time
@@ -207,44 +217,32 @@ class Planner:
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
 
-    def _in_torso(self, points: Vector) -> Vector:
-        frame = self._robot.torso_frame
-        return (points - self._measured.position(frame)) @ self._measured.rotation(frame)
-
-    def _from_torso(self, points: Vector) -> Vector:
-        frame = self._robot.torso_frame
-        return self._measured.position(frame) + points @ self._measured.rotation(frame).T
-
-    def _measured_soles(self) -> Vector:
-        return np.array([self._measured.position(f) for f in self._robot.sole_frames])
-
-    def _measured_yaws(self) -> Vector:
-        rotations = (self._measured.rotation(f) for f in self._robot.sole_frames)
-        return np.array([heading_of(R) for R in rotations])
-
     def _advance(self, state: RobotState, events: list[str]) -> None:
         """Steps, tasks, contacts and the postures behind them one plan further."""
         contacts, references, dt = self._contacts, self._references, self._elapsed
         gate_open = contacts.gate_open
-        self._gate = float(np.clip(self._gate + (dt if gate_open else -dt) / GATE_TIME, 0.0, 1.0))
+        go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
+        self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
         self._gait.aim(self._footstep_shift[0], dt)
         self._gait.advance(
             state.time,
             dt,
             rate=self._gate,
-            soles=self._measured_soles(),
-            yaws=self._measured_yaws(),
+            soles=self._measured.soles,
+            yaws=self._measured.sole_yaws,
             loads=state.sole_wrench_in_world[:, 2],
             events=events,
         )
         references.advance(
-            state.time, dt, gate_open=gate_open, palms=self._palms, com=self._measured.com, events=events
+            state.time, dt, gate_open=gate_open, palms=self._measured.palms, com=self._measured.com, events=events
         )
         contacts.advance(
             dt,
-            palms=self._palms,
+            palms=self._measured.palms,
+            palm_velocities=self._measured.palm_velocities,
             palm_forces=state.palm_force_in_world,
-            homes=self._from_torso(self._palm_homes),
+            homes=self._measured.palm_homes,
+            urgency=self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0,
             events=events,
         )
         asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
@@ -278,11 +276,14 @@ class Planner:
         return need_at_rest(com, polygon=polygon, mass=mass)
 
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
-        """Support at full pace and at the gate's, its inset smaller the louder the alarm."""
-        settings = self._settings.whole_body
-        margin = settings.zmp_margin + self._com.alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+        """Support to judge the need for a contact by, at full pace, and to move in, at the gate's.
 
-        def preview(rate: float) -> SupportPreview:
+        The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
+        """
+        settings, alarm = self._settings.whole_body, self._com.alarm
+        margin = settings.zmp_margin + alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+
+        def preview(rate: float, margin: float) -> SupportPreview:
             return self._gait.preview(
                 time,
                 self._preview.times,
@@ -292,73 +293,8 @@ class Planner:
                 half_extents=self._robot.sole_half_extents,
             )
 
-        at_once = preview(1.0)
-        return at_once, at_once if self._gate >= 1.0 else preview(self._gate)
-
-    def _plan_height(self, wanted: Vector, band: Vector, plane: float) -> tuple[HeightPlan, QpSolution]:
-        """Stage 1; when it fails or is turned off the height stays where it is."""
-        settings, steps = self._settings.height, self._preview.steps
-        limits = np.tile([plane + settings.lowest, plane + settings.highest], (steps, 1))
-        plan, solution = self._height_stage.solve(self._com.value[2], wanted=wanted, limits=limits, band=band)
-        if plan is None or not settings.enabled:
-            self._com.value[2, 1:] = 0.0
-            zero = np.zeros(steps)
-            plan = HeightPlan(zero, np.full(steps, self._com.value[2, 0]), zero, zero)
-        return plan, solution
-
-    def _make_plan(
-        self,
-        motion: HorizontalPlan | None,
-        height: HeightPlan,
-        hands: list[tuple[Vector, Vector, HandMode]],
-        soles: SoleReferences,
-        report: PlanReport,
-    ) -> Plan:
-        if motion is None and self._last is not None:
-            return replace(self._last, report=report)
-        n, com, contacts = self._preview.steps, self._com.value, self._contacts.hands
-        states = np.empty((n + 1, 3, 3))
-        states[0] = com
-        jerk = np.zeros((n, 3))
-        jerk[:, 2] = height.jerk
-        states[1:, 2] = np.column_stack([height.height, height.velocity, height.acceleration])
-        velocity = np.zeros(self._robot.nv)
-        if motion is not None:
-            jerk[:, :2] = motion.jerk
-            states[1:, :2] = np.stack([motion.com, motion.velocity, motion.acceleration], axis=2)
-            velocity = motion.joint_velocity
-        else:
-            states[1:, :2] = com[:2]
-        palm_position, palm_velocity = self._joints.palms(velocity)
-        caps = np.array([c.caps(np.array([0.0, self._period])) for c in contacts])  # now and one plan later
-        zero = np.zeros((len(SIDES), 3))
-        return Plan(
-            time=report.time,
-            step=self._preview.step,
-            com_states=states,
-            com_jerk=jerk,
-            q=self._joints.q,
-            velocity=velocity,
-            torso_rotation=self._joints.torso_rotation,
-            torso_angular_velocity=self._joints.torso_velocity(velocity),
-            foot_stance=np.array(self._gait.stance),
-            foot_position=soles.positions,
-            foot_yaw=soles.yaws,
-            foot_yaw_rate=soles.yaw_rates,
-            foot_velocity=soles.velocities,
-            foot_acceleration=soles.accelerations,
-            hand_mode=np.array([int(mode) for _, _, mode in hands]),
-            hand_position=palm_position,
-            hand_velocity=palm_velocity,
-            hand_acceleration=zero,
-            hand_force=report.contact_force[:, 0],
-            hand_force_cap=caps[:, 0],
-            hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / self._period,
-            hand_force_cap_top=np.array([c.patch.force_cap if c.patch else 0.0 for c in contacts]),
-            hand_normal=np.array([c.patch.normal if c.patch else [0.0, 0.0, 1.0] for c in contacts]),
-            hand_friction=np.array([c.patch.friction if c.patch else 0.5 for c in contacts]),
-            report=report,
-        )
+        judged = preview(1.0, settings.zmp_margin)
+        return judged, judged if self._gate >= 1.0 and alarm == 0.0 else preview(self._gate, margin)
 
 
 def _stage_report(solution: QpSolution, start: float) -> StageReport:

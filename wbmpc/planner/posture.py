@@ -14,6 +14,7 @@ DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 PATIENCE = 120  # iterations for the same targets; what has not converged by then is out of reach
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
+SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets are in reach
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
@@ -35,11 +36,17 @@ class Posture:
         self._lower, self._upper = robot.joint_lower + JOINT_MARGIN, robot.joint_upper - JOINT_MARGIN
         self.q = nominal.copy()  # (nq,)
         self.com = np.zeros(3)  # [m] of the last iterate
+        self.palm_errors = np.zeros(2)  # [m] of the last iterate; 0 without a target
         self.residual = np.inf  # [m] largest palm or sole error of the last iterate
         self._reached: tuple[bool, ...] = ()  # which palms had a target
         self._targets: tuple[bytes, ...] = ()
         self._step = np.inf  # [rad, m] largest change of the last iteration
         self._left = PATIENCE
+
+    @property
+    def settled(self) -> bool:
+        """Whether more iterations for the same targets would change nothing, or have been given up."""
+        return self._step < SETTLED or self._left == 0
 
     @property
     def torso_up(self) -> Vector:
@@ -75,6 +82,7 @@ class Posture:
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
             self.residual = 0.0
+            self.palm_errors[:] = 0.0
             for side, frame in enumerate(robot.sole_frames):
                 level = level_frame(yaws[side])
                 J = kinematics.jacobian(frame)
@@ -93,7 +101,8 @@ class Posture:
                     continue
                 J = kinematics.jacobian(frame)[:3]
                 error = target - kinematics.position(frame)
-                self.residual = max(self.residual, float(np.linalg.norm(error)))
+                self.palm_errors[side] = np.linalg.norm(error)
+                self.residual = max(self.residual, float(self.palm_errors[side]))
                 error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
                 H += PALM_COST * (J.T @ J)
                 g += PALM_COST * (J.T @ error)

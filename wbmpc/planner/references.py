@@ -17,6 +17,7 @@ from wbmpc.signals import SIDES, HandMode, Vector
 
 REACH_FLOOR, FOOT_FLOOR = 0.12, 0.05  # [m] smallest d of hand and foot: neither pins the CoM to itself
 UNBOUNDED = 0.3  # [m] d of a hand without a reference
+SPENT = 0.02  # [m] palm error of a posture from which a contact does not reach
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
 LEAN_BAND = 0.001  # [m] d of the CoM from a lean's way
@@ -121,15 +122,17 @@ class References:
 
     # ------------------------------------------------------------------ over the horizon
 
-    def palms(self, time: float, contacts: Contacts, *, pace: float | None = None) -> tuple[Vector, Vector]:
+    def palms(self, time: float, contacts: Contacts | None, *, pace: float | None = None) -> tuple[Vector, Vector]:
         """Palm references (2, N, 3) [m], nan for a free hand, and the furthest task's σ (N,).
 
-        `pace`: of all tasks' clocks, 0 … 1; None: each at its own gate's.
+        Args:
+            contacts: None leaves them out: what the tasks alone ask for.
+            pace: of all tasks' clocks, 0 … 1; None: each at its own gate's.
         """
         times = self._times
         references = np.full((len(SIDES), len(times), 3), np.nan)
         sigma = np.zeros(len(times))
-        for contact in contacts.hands:
+        for contact in contacts.hands if contacts is not None else ():
             if contact.goal is not None:
                 references[contact.side] = contact.preview(times)
         for task in self._current:
@@ -225,6 +228,12 @@ class References:
         """Yaw of the torso [rad]: the feet's, `feet`, or as in the postures of contacts and task."""
         base = feet if contacts.posture is None else contacts.posture.torso_heading
         return base + self._sigma * (self._goal.torso_heading - base)
+
+    def spent(self, contacts: Contacts) -> tuple[int, ...]:
+        """Sides of contacts that a stride's end leaves out of the palm's reach."""
+        if self._stride is None or not self._goal.settled:
+            return ()
+        return tuple(c.side for c in contacts.hands if c.touching and self._goal.palm_errors[c.side] > SPENT)
 
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""

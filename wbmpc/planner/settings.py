@@ -52,7 +52,7 @@ class WholeBodySettings(StrictModel):
         0.0, description="[m] the inset when the measured capture point is far off the plan: a push; negative: outside"
     )
     alarm_urgency: float = Field(
-        30.0, ge=1, description="factor on velocity_cost and position_cost when the capture point is far off the plan"
+        100.0, ge=1, description="factor on velocity_cost and position_cost when the capture point is far off the plan"
     )
     zmp_margin_growth: float = Field(
         0.008, ge=0, description="[m/s] growth of the inset over the horizon: room to react to what is not known yet"
@@ -69,6 +69,7 @@ class GaitSettings(StrictModel):
     swing_time: float = Field(0.5, gt=0.1, description="[s] single support of a walking step")
     double_support: float = Field(0.15, gt=0.02, description="[s] between two walking steps")
     first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
+    stride_double_support: float = Field(1.0, gt=0.1, description="[s] before a step that is planned with a posture")
     step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
     step_width: float = Field(0.09, gt=0, description="[m] between the soles' centres when walking")
     turning_room: float = Field(
@@ -95,6 +96,10 @@ class ContactSettings(StrictModel):
     approach_clearance: float = Field(0.03, gt=0, description="[m] distance above the patch where the descent begins")
     approach_speed: float = Field(0.18, gt=0, description="[m/s] mean speed of the hand towards the clearance point")
     touch_speed: float = Field(0.06, gt=0, description="[m/s] speed of the descent: bounds the impact")
+    urgent_acceleration: float = Field(30.0, gt=0, description="[m/s²] of the hand when the robot is falling")
+    urgent_touch_speed: float = Field(0.35, gt=0, description="[m/s] speed at which that hand meets the surface")
+    urgent_time: float = Field(0.22, gt=0, description="[s] a hand that needs longer comes too late to stop a fall")
+    urgent_ramp_time: float = Field(0.04, gt=0, description="[s] ramp of the force cap after such a landing")
     search_depth: float = Field(0.03, gt=0, description="[m] how far below the patch a descent looks for it")
     force_cost: float = Field(1.0, gt=0, description="[cost] weight of (n·f)²/(m g)²")
     tangent_cost: float = Field(

@@ -7,6 +7,7 @@ import numpy as np
 from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.settings import GaitSettings
+from wbmpc.rotations import angle_difference
 from wbmpc.scenario import GoTask, StepTask, Task, WalkTask
 from wbmpc.signals import Vector
 
@@ -21,7 +22,8 @@ class Stepping:
     """The footsteps that the tasks ask for, one at a time.
 
     A velocity command puts each foot where the body will need it (Herdt et al. 2010): the foot on the side of a
-    sideways or turning motion goes first and takes all of it, the other one closes up, so that legs never cross.
+    sideways motion takes all of it, that on the side of a turn the turn, and the other one closes up, so that legs never
+    cross.
     """
 
     def __init__(self, tasks: tuple[Task, ...], settings: GaitSettings, footholds: Footholds) -> None:
@@ -63,13 +65,13 @@ class Stepping:
 
     def _commanded(self, index: int, task: StepTask, feet: Feet) -> Footstep:
         side = ("left", "right").index(task.foot)
-        settings = self._settings
+        settings, stance_yaw = self._settings, float(feet.yaws[1 - side])
         return Footstep(
             side=side,
             position=np.array([*task.target, feet.positions[1 - side][2]]),
-            yaw=task.yaw,
+            yaw=stance_yaw + angle_difference(task.yaw, stance_yaw),  # not around by whole turns
             swing_time=task.duration,
-            double_support=settings.first_double_support,
+            double_support=settings.stride_double_support,
             clearance=settings.step_height,
             lead=CAREFUL_LEAD,
             adaptable=False,
@@ -119,7 +121,7 @@ class Stepping:
             position=np.array([*place(ahead), feet.positions[1 - side][2]]),
             yaw=yaw,
             swing_time=task.swing_time,
-            double_support=settings.first_double_support,
+            double_support=settings.stride_double_support,
             clearance=max(settings.step_height, height),
             lead=CAREFUL_LEAD,
             adaptable=False,
@@ -135,16 +137,15 @@ class Stepping:
         moving = float(np.abs(command).max()) > STILL
         if not moving and (feet.last < 0 or _aligned(feet)):
             return None
-        leading = 0 if command[1] + 0.1 * command[2] >= 0.0 else 1
-        side = leading if feet.last < 0 else 1 - feet.last
+        vx, vy, omega = command
+        sideways, turning = 0 if vy >= 0.0 else 1, 0 if omega >= 0.0 else 1  # the foot that takes each motion
+        side = (sideways if abs(vy) >= 0.1 * abs(omega) else turning) if feet.last < 0 else 1 - feet.last
         stance = 1 - side
         period = settings.swing_time + settings.double_support
-        vx, vy, omega = command
-        share = 2.0 * period if side == leading else 0.0
-        yaw = float(feet.yaws[stance]) + omega * share
-        # lateral and turning motion is taken by the leading foot, for two steps; the forward one by both
+        yaw = float(feet.yaws[stance]) + (2.0 * period * omega if side == turning else 0.0)
+        # lateral and turning motion are taken by one foot, for two steps; the forward one by both
         width = settings.step_width + turning_room(settings, yaw - float(feet.yaws[stance]))
-        offset = np.array([vx * period, SIDE_SIGN[side] * width + vy * share])
+        offset = np.array([vx * period, SIDE_SIGN[side] * width + (2.0 * period * vy if side == sideways else 0.0)])
         half_turn = _rotation(0.5 * (float(feet.yaws[stance]) + yaw))
         position = feet.positions[stance].copy()
         position[:2] += half_turn @ offset

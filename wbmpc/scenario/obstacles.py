@@ -12,8 +12,11 @@ from wbmpc.signals import Vector
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Obstacle:
-    """A box that no foot may be put on, as the planner sees it."""
+    """A box that no foot may be put on and no free arm may touch, as the planner sees it."""
 
+    centre: Vector  # (3,) [m]
+    half: Vector  # (3,) [m] half edge lengths
+    yaw: float  # [rad]
     corners: Vector  # (4, 2) [m] of its footprint, counter-clockwise
     bottom: float  # [m]
     top: float  # [m]
@@ -23,6 +26,9 @@ def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
     """All boxes of a scenario that are not walkable, whether or not they are present, in the order of the file."""
     return tuple(
         Obstacle(
+            centre=np.array(box.centre),
+            half=np.array(box.size) / 2,
+            yaw=box.yaw,
             corners=_corners(np.array(box.position), np.array(box.size[:2]) / 2, box.yaw),
             bottom=box.bottom,
             top=box.bottom + box.size[2],

@@ -116,7 +116,10 @@ class TaskStack:
             self.target[rows] = -s.stance_damping * velocity - kinematics.drift(frame)[:3]
             self._hand_integral[side] = 0.0
             return
-        self.weight[rows] = s.hand_weight
+        urgency = float(setpoint.hand_urgency[side])
+        self.weight[rows] = s.hand_weight + urgency * (s.urgent_hand_weight - s.hand_weight)
+        limit = s.hand_acceleration_limit
+        limit += urgency * (s.urgent_hand_acceleration_limit - limit)
         error = setpoint.hand_position[side] - kinematics.position(frame)
         integral = self._hand_integral[side]
         if abs(setpoint.hand_velocity[side]).max() < 0.02:  # a moving hand's lag is not a steady error
@@ -126,6 +129,6 @@ class TaskStack:
         wanted = s.hand_stiffness * error + s.hand_damping * (setpoint.hand_velocity[side] - velocity)
         wanted += s.hand_integral * integral
         norm = float(np.sqrt(wanted @ wanted))
-        if norm > s.hand_acceleration_limit:
-            wanted *= s.hand_acceleration_limit / norm
+        if norm > limit:
+            wanted *= limit / norm
         self.target[rows] = setpoint.hand_acceleration[side] + wanted - kinematics.drift(frame)[:3]

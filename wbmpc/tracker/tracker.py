@@ -12,6 +12,7 @@ from wbmpc.qp import QuadraticProgram, make_workspace
 from wbmpc.robot import Robot
 from wbmpc.rotations import contact_frame
 from wbmpc.signals import RobotState, Setpoint, TorqueCommand, Vector
+from wbmpc.tracker.clearance import CLEARANCE_ROWS, Clearance
 from wbmpc.tracker.constraints import (
     PALM_ROWS,
     PRESSURE_ROWS,
@@ -25,6 +26,7 @@ from wbmpc.tracker.settings import TrackerSettings
 from wbmpc.tracker.tasks import CONTACT, TaskStack
 
 FORCES = 18  # two sole wrenches (6 each), then two palm forces (3 each), each in its contact's own frame
+SENSED_SHARE = 0.2  # per tick, of the filtered palm force
 FRICTION_SPEED = 0.1  # [rad/s] wanted speed from which a joint's dry friction is fully compensated
 TORQUE_SLACK_COST = 1e4  # [cost / (N·m)²]; what a violated row would ask is clipped by the servo's limit anyway
 
@@ -35,7 +37,8 @@ class Tracker:
     subject to  M v̇ + h = [0; τ] + J_cᵀ F     floating base and joints,
                 W F ≤ 0                        wrench cones of the soles, friction pyramids of the palms,
                 τ_low(q̇) ≤ τ ≤ τ_high(q̇)       the servo's torque-speed line (soft, then clipped),
-                q̈_low ≤ q̈ ≤ q̈_high             joint position and speed limits.
+                q̈_low ≤ q̈ ≤ q̈_high             joint position and speed limits,
+                C v̇ ≥ c                         arms off the trunk and off the wall (soft).
 
     The six base rows give v̇_base = M_bb⁻¹ (J_cbᵀ F − h_b − M_bj q̈), which eliminates them; the unknowns are
     y = (q̈ (nj), F (18)) and the torques follow from the joint rows.
@@ -58,12 +61,15 @@ class Tracker:
         self._torque_rows = slice(0, nj)
         self._palm_rows = slice(nj + 2 * WRENCH_ROWS, nj + 2 * WRENCH_ROWS + 2 * PALM_ROWS)
         comfort_rows = slice(self._palm_rows.stop, self._palm_rows.stop + 2 * PRESSURE_ROWS)
-        rows = comfort_rows.stop
+        self._clearance_rows = slice(comfort_rows.stop, comfort_rows.stop + CLEARANCE_ROWS)
+        self._clearance = Clearance(robot, settings)
+        rows = self._clearance_rows.stop
         soft = np.zeros(rows)
+        soft[self._clearance_rows] = settings.clearance_weight
         soft[self._torque_rows] = TORQUE_SLACK_COST
         soft[comfort_rows] = settings.foot_comfort_weight
         self.problem = QuadraticProgram(nj + FORCES, rows, soft_weight=soft)
-        self.problem.upper[nj:] = 0.0
+        self.problem.upper[nj : self._clearance_rows.start] = 0.0
         wrench_rows = sole_wrench_rows(
             half_extents=robot.sole_half_extents - settings.foot_inset,
             friction=settings.foot_friction,
@@ -85,6 +91,7 @@ class Tracker:
         self._diagonal = np.zeros(nj + FORCES)
         self._reference = np.zeros(nj + FORCES)
         self._stacked = np.zeros((self._tasks.matrix.shape[0], nj + FORCES))
+        self._sensed = np.zeros(2)  # [N] filtered normal force of each braced palm
         self._torque = np.zeros(nj)
         self._torque_offset = np.zeros(nj)
         self._torque_bounds = self._limits.torque(np.zeros(nj))
@@ -95,7 +102,8 @@ class Tracker:
         kinematics, nj = self._kinematics, self._robot.nj
         kinematics.update(state.q, state.v)
         self._tasks.build(kinematics, state.v, setpoint)
-        self._contacts(kinematics, setpoint)
+        self._clearance.build(kinematics, state.v, setpoint)
+        self._contacts(kinematics, setpoint, state.palm_force_in_world)
         self._torque_bounds = lower, upper = self._limits.torque(state.v[6:])
         base_offset = self._assemble(state, setpoint)
         solution = self._workspace.solve()
@@ -138,8 +146,11 @@ class Tracker:
             fallback=False,
         )
 
-    def _contacts(self, kinematics: Kinematics, setpoint: Setpoint) -> None:
-        """Contact Jacobians, force bounds, cones and force references, each in its contact's own frame."""
+    def _contacts(self, kinematics: Kinematics, setpoint: Setpoint, palm_force: Vector) -> None:
+        """Contact Jacobians, force bounds, cones and force references, each in its contact's own frame.
+
+        `palm_force` (2, 3) is sensed, in world [N].
+        """
         qp, nj, settings = self.problem, self._robot.nj, self._settings
         lower, upper = qp.x_lower[nj:], qp.x_upper[nj:]
         lower[:], upper[:] = 0.0, 0.0
@@ -159,12 +170,17 @@ class Tracker:
             palm = slice(12 + 3 * side, 15 + 3 * side)
             if int(setpoint.hand_mode[side]) != CONTACT:
                 self._contact_jacobian[palm] = 0.0
+                self._sensed[side] = 0.0
                 continue
             R = contact_frame(setpoint.hand_normal[side])
             self._contact_rotation[2 + side] = R
             self._contact_jacobian[palm] = R.T @ self._tasks.matrix[21 + 3 * side : 24 + 3 * side]
             lower[palm], upper[palm] = -np.inf, np.inf
-            lower[14 + 3 * side], upper[14 + 3 * side] = 0.0, setpoint.hand_force_cap[side]
+            sensed = float(palm_force[side] @ setpoint.hand_normal[side])
+            self._sensed[side] += SENSED_SHARE * (max(sensed, 0.0) - self._sensed[side])
+            # A palm that has bounced off would be thrown at the surface again by a force that nothing takes up.
+            most = min(float(setpoint.hand_force_cap[side]), self._sensed[side] + settings.hand_force_rise)
+            lower[14 + 3 * side], upper[14 + 3 * side] = 0.0, most
             first = self._palm_rows.start + side * PALM_ROWS
             qp.matrix[first : first + PALM_ROWS, nj + 12 + 3 * side : nj + 15 + 3 * side] = palm_force_rows(
                 setpoint.hand_friction[side]
@@ -214,5 +230,11 @@ class Tracker:
         lower, upper = self._torque_bounds
         np.subtract(lower, self._torque_offset, out=qp.lower[self._torque_rows])
         np.subtract(upper, self._torque_offset, out=qp.upper[self._torque_rows])
+
+        clearance = self._clearance
+        rows = qp.matrix[self._clearance_rows]
+        np.matmul(clearance.matrix[:, :6], base_map, out=rows)
+        rows[:, :nj] += clearance.matrix[:, 6:]
+        qp.lower[self._clearance_rows] = clearance.lower - clearance.matrix[:, :6] @ base_offset
         qp.x_lower[:nj], qp.x_upper[:nj] = self._limits.acceleration(position, velocity)
         return base_offset

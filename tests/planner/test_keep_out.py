@@ -1,0 +1,56 @@
+"""Half-spaces that keep free arms off obstacles: against distances found by brute force."""
+
+from __future__ import annotations
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from wbmpc.planner.keep_out import DISTANCE, NEAR, KeepOut
+from wbmpc.scenario import Obstacle
+
+number = st.floats(-0.3, 0.3)
+
+
+def box(centre: tuple[float, float, float], half: tuple[float, float, float], yaw: float) -> Obstacle:
+    return Obstacle(
+        centre=np.array(centre), half=np.array(half), yaw=yaw, corners=np.zeros((4, 2)), bottom=0.0, top=1.0
+    )
+
+
+def surface_points(obstacle: Obstacle) -> np.ndarray:
+    """A dense grid of points in and on the box, in world."""
+    grid = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 25)] * 3), axis=-1).reshape(-1, 3) * obstacle.half
+    c, s = np.cos(obstacle.yaw), np.sin(obstacle.yaw)
+    return obstacle.centre + grid @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@settings(max_examples=60, deadline=None)
+@given(point=st.tuples(number, number, number), yaw=st.floats(-3.0, 3.0))
+def test_the_half_space_of_a_point_outside_touches_the_nearest_point_of_the_box(
+    point: tuple[float, float, float], yaw: float
+) -> None:
+    obstacle = box((0.05, -0.02, 0.1), (0.1, 0.04, 0.06), yaw)
+    x = np.array(point)
+    points = surface_points(obstacle)
+    distances = np.linalg.norm(points - x, axis=1)
+    row = KeepOut((obstacle,)).half_spaces(x[None])[0]
+    if distances.min() > NEAR + 0.01:
+        assert row[3] == -np.inf
+    elif 0.01 < distances.min() < NEAR - 0.01:
+        assert abs(np.linalg.norm(row[:3]) - 1.0) < 1e-9
+        assert (points @ row[:3]).max() <= row[3] - DISTANCE + 1e-9  # the box lies behind it
+        assert abs(row[:3] @ x - row[3] + DISTANCE - distances.min()) < 0.005  # by the distance of the point
+
+
+def test_a_point_inside_is_shown_the_shortest_way_out() -> None:
+    row = KeepOut((box((0.0, 0.0, 0.0), (0.1, 0.2, 0.3), 0.0),)).half_spaces(np.array([[-0.09, 0.05, 0.1]]))[0]
+    assert np.allclose(row[:3], [-1.0, 0.0, 0.0])
+    assert abs(row[3] - (0.1 + DISTANCE)) < 1e-12
+
+
+def test_the_nearest_of_several_obstacles_counts_and_none_gives_none() -> None:
+    near, far = box((0.1, 0.0, 0.0), (0.05, 0.05, 0.05), 0.0), box((-0.15, 0.0, 0.0), (0.05, 0.05, 0.05), 0.0)
+    row = KeepOut((far, near)).half_spaces(np.zeros((1, 3)))[0]
+    assert np.allclose(row, [-1.0, 0.0, 0.0, -0.05 + DISTANCE])
+    assert KeepOut(()).half_spaces(np.zeros((2, 3)))[:, 3].tolist() == [-np.inf, -np.inf]

@@ -1,0 +1,75 @@
+"""A plan out of what the stages, the gait and the hand contacts have decided."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.planner.footstep import SoleReferences
+from wbmpc.planner.hand_contact import HandContact
+from wbmpc.planner.joint_reference import JointReference
+from wbmpc.planner.plan import Plan
+from wbmpc.signals import SIDES, HandMode, PlanReport, Vector
+
+
+def assemble(
+    report: PlanReport,
+    *,
+    step: float,
+    period: float,
+    course: tuple[Vector, Vector],
+    velocity: Vector,
+    joints: JointReference,
+    stance: tuple[bool, bool],
+    soles: SoleReferences,
+    modes: list[HandMode],
+    contacts: list[HandContact],
+    arm_keep_out: Vector,
+) -> Plan:
+    """The plan of one snapshot.
+
+    Args:
+        step: T [s]; `period`: until the next plan [s].
+        course: CoM states (N + 1, 3, 3) and jerks (N, 3), see `com_course`.
+        velocity: stage 2's joint velocities (nv,).
+        stance: which feet stand.
+        modes: of both hands.
+        arm_keep_out: (2, 3, 4) half-spaces of the arms' points; those of a hand with a task are left out, it finds its
+            own way.
+    """
+    palm_position, palm_velocity = joints.palms(velocity)
+    palm_acceleration = np.zeros((len(SIDES), 3))
+    for contact in contacts:
+        if contact.hurried:  # straight from its path: stage 2's joint reference would come too late
+            side = contact.side
+            palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
+    caps = np.array([c.caps(np.array([0.0, period])) for c in contacts])  # now and one plan later
+    arm_keep_out[[mode != HandMode.FREE for mode in modes], :, 3] = -np.inf
+    return Plan(
+        time=report.time,
+        step=step,
+        com_states=course[0],
+        com_jerk=course[1],
+        q=joints.q,
+        velocity=velocity,
+        torso_rotation=joints.torso_rotation,
+        torso_angular_velocity=joints.torso_velocity(velocity),
+        foot_stance=np.array(stance),
+        foot_position=soles.positions,
+        foot_yaw=soles.yaws,
+        foot_yaw_rate=soles.yaw_rates,
+        foot_velocity=soles.velocities,
+        foot_acceleration=soles.accelerations,
+        hand_mode=np.array([int(mode) for mode in modes]),
+        hand_position=palm_position,
+        hand_velocity=palm_velocity,
+        hand_acceleration=palm_acceleration,
+        hand_urgency=np.array([float(c.hurried) for c in contacts]),
+        hand_force=report.contact_force[:, 0],
+        hand_force_cap=caps[:, 0],
+        hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / period,
+        hand_force_cap_top=np.array([c.patch.force_cap if c.patch else 0.0 for c in contacts]),
+        hand_normal=np.array([c.patch.normal if c.patch else [0.0, 0.0, 1.0] for c in contacts]),
+        hand_friction=np.array([c.patch.friction if c.patch else 0.5 for c in contacts]),
+        arm_keep_out=arm_keep_out,
+        report=report,
+    )

@@ -1,0 +1,43 @@
+"""What was measured at a plan's snapshot, as the planner needs it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.kinematics import Kinematics
+from wbmpc.robot import Robot
+from wbmpc.rotations import heading_of
+from wbmpc.signals import RobotState, Vector
+
+
+class Snapshot:
+    """The robot at the last snapshot; all in world."""
+
+    def __init__(self, robot: Robot, q: Vector) -> None:
+        """At rest at `q` (nq,)."""
+        self._robot, self._kinematics = robot, Kinematics(robot)
+        self._kinematics.update(q, np.zeros(robot.nv))
+        self._read()
+        self._homes = (self.palms - self._torso_position) @ self._torso_rotation  # in the torso
+
+    def update(self, state: RobotState) -> None:
+        """Take in a new state."""
+        self._kinematics.update(state.q, state.v)
+        self._read()
+
+    @property
+    def palm_homes(self) -> Vector:
+        """(2, 3) [m] where free palms hang: where they were at the start, as seen from the torso."""
+        return self._torso_position + self._homes @ self._torso_rotation.T
+
+    def _read(self) -> None:
+        kinematics, robot = self._kinematics, self._robot
+        self.com, self.com_velocity = kinematics.com, kinematics.com_velocity  # (3,) [m], [m/s]
+        self.palms = np.array([kinematics.position(f) for f in robot.palm_frames])  # (2, 3) [m]
+        elbows = np.array([kinematics.position(f) for f in robot.elbow_frames])
+        self.arm_points = np.stack([self.palms, 0.5 * (self.palms + elbows), elbows], axis=1)  # (2, 3, 3) [m]
+        self.palm_velocities = np.array([kinematics.velocity(f)[:3] for f in robot.palm_frames])  # (2, 3) [m/s]
+        self.soles = np.array([kinematics.position(f) for f in robot.sole_frames])  # (2, 3) [m]
+        self.sole_yaws = np.array([heading_of(kinematics.rotation(f)) for f in robot.sole_frames])  # (2,) [rad]
+        self._torso_position = kinematics.position(robot.torso_frame)
+        self._torso_rotation = kinematics.rotation(robot.torso_frame)
