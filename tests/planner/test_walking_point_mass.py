@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gait_case import DT, HALF, PERIOD, SETTINGS, IdealGait, feet_at, walk
+from gait_case import DT, PERIOD, SETTINGS, IdealGait, feet_at, walk
 from numpy.testing import assert_allclose
 
 from wbmpc.planner.preview import Preview
