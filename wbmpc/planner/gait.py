@@ -69,6 +69,11 @@ class Gait:
             return None
         return Stride(step, self.feet, self.swing, self._left)
 
+    def shares(self, times: Vector, rate: float) -> Vector:
+        """Shares (n,) of a stride's way done `times` (n,) seconds from now at `rate`; 0 without one."""
+        stride = self.stride
+        return np.zeros(len(times)) if stride is None else stride.shares(times, rate=rate)
+
     @property
     def crouch(self) -> float:
         """How much lower than a standing CoM that of a walk is [m]; 0 when not walking."""
@@ -241,7 +246,7 @@ class Gait:
                 break
             step = self._stepping.next(feet, time + end, made=made)
             end = end + step.double_support if step else NEVER
-            intervals.append(Interval(end, feet, -1, moved, step and _transfer(step, feet, end)))
+            intervals.append(Interval(end, feet, -1, moved, _transfer(step, feet, end) if step else None))
             if step is not None:
                 end += step.swing_time
         intervals.append(Interval(NEVER, feet, -1, moved))
