@@ -202,7 +202,9 @@ def check_preview(run: IdealGait, seconds: float) -> None:
         about = [(polygon, stance) for time, polygon, stance in actual if abs(time - t) < NEAR]
         singles = [polygon for polygon, stance in about if not all(stance)]
         doubles = [polygon for polygon, stance in about if all(stance)]
-        assert any(same(preview.polygons[k], p) for p in singles) or any(inside(preview.polygons[k], p) for p in doubles)
+        assert any(same(preview.polygons[k], p) for p in singles) or any(
+            inside(preview.polygons[k], p) for p in doubles
+        )
         if not doubles:
             assert preview.centring[k] == 1.0
         assert_allclose(preview.normals[k] @ preview.polygons[k].centre <= preview.offsets[k], True)
@@ -252,7 +254,7 @@ def test_rows_move_with_the_footsteps(command: Velocity, ticks: int, x: float, y
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0), yaw=st.floats(-0.5, 0.5))
 def test_a_transfer_moves_exactly_with_its_footsteps(seed: int, share: float, yaw: float) -> None:
-    """The sole that slides from foot to foot, both of them displaced, is where the shares say; at its ends it is a foot."""
+    """The sole that slides from foot to foot, both displaced, is where the shares say; at its ends it is a foot."""
     rng = np.random.default_rng(seed)
     feet = Feet(np.array([[0.0, 0.05, 0.0], [0.04, -0.05, 0.0]]), np.array([yaw, 0.0]), 0)
     displaced = rng.uniform(-0.05, 0.05, (2, 2))

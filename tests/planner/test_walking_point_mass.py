@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from gait_case import DT, HALF, PERIOD, SETTINGS, IdealGait, feet_at, walk
+from gait_case import DT, PERIOD, SETTINGS, IdealGait, feet_at, walk
 from numpy.testing import assert_allclose
 
 from wbmpc.planner.preview import Preview
@@ -146,7 +146,7 @@ def test_a_push_that_fells_fixed_footsteps_is_survived_with_adaptation() -> None
     assert not adapted.fallen
     assert np.abs(np.array(adapted.com[-1]) - adapted.middle[-1]).max() < 0.06
     undisturbed = np.array(forward().landings)
-    aside = np.array(adapted.landings)[:len(undisturbed)] - undisturbed[: len(adapted.landings)]
+    aside = np.array(adapted.landings)[: len(undisturbed)] - undisturbed[: len(adapted.landings)]
     assert aside[:, 1].max() > 0.03
     mean = (adapted.com[-1] - adapted.com[-1 - round(2 * PERIOD / DT)]) / (2 * PERIOD)
     assert_allclose(mean, [0.1, 0.0], atol=0.02)  # and walks on

@@ -132,7 +132,7 @@ def test_recorded_instances(path):
 
 @pytest.mark.parametrize("path", MIXED, ids=lambda path: path.stem)
 def test_recorded_choice_is_the_cheapest_set(path):
-    """At most two contacts: fixing each set of binaries and solving the QP left is an independent way to the optimum."""
+    """Of at most two contacts: fixing each set and solving the QP that is left is an independent way to the optimum."""
     problem = load_instance(path)
     binary, cost = problem.binary, {}
     for taken in (*itertools.combinations(range(binary.size), 1), *itertools.combinations(range(binary.size), 2)):
