@@ -75,10 +75,15 @@ class Gait:
         return np.zeros(len(times)) if stride is None else stride.shares(times, rate=rate)
 
     @property
+    def walking(self) -> bool:
+        """Whether the step ahead or under way is one of a walk."""
+        step = self.step if self.swing is None else self.swing.step
+        return step is not None and step.adaptable
+
+    @property
     def crouch(self) -> float:
         """How much lower than a standing CoM that of a walk is [m]; 0 when not walking."""
-        step = self.step if self.swing is None else self.swing.step
-        return self._settings.crouch if step is not None and step.adaptable else 0.0
+        return self._settings.crouch if self.walking else 0.0
 
     # ------------------------------------------------------------------ one plan later
 

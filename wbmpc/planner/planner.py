@@ -101,10 +101,8 @@ class Planner:
         foot, gated_foot = self._gait.shares(preview.times, 1.0), self._gait.shares(preview.times, self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
-        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot))
-        height, solution = self._height_stage.plan(
-            self._com.value[2], wanted=wanted - self._gait.crouch, band=band, plane=plane
-        )
+        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)) - self._gait.crouch
+        height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
@@ -281,7 +279,8 @@ class Planner:
         The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
         """
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
-        margin = settings.zmp_margin + alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
+        loudest = settings.zmp_margin_step if gait.walking else settings.zmp_margin_alarm
+        margin = settings.zmp_margin + alarm * (loudest - settings.zmp_margin)
 
         def preview(rate: float, margin: float) -> SupportPreview:
             return gait.preview(

@@ -40,7 +40,7 @@ class WholeBodySettings(StrictModel):
     velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(5e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
-    footstep_cost: float = Field(1000.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
+    footstep_cost: float = Field(200.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
     zmp_centre_cost: float = Field(
         50.0, ge=0, description="[cost / m²] a ZMP off the centre of the foot that carries a step alone"
     )
@@ -50,6 +50,9 @@ class WholeBodySettings(StrictModel):
     zmp_margin: float = Field(0.018, ge=0, description="[m] inset of the support polygon")
     zmp_margin_alarm: float = Field(
         0.0, description="[m] the inset when the measured capture point is far off the plan: a push; negative: outside"
+    )
+    zmp_margin_step: float = Field(
+        0.012, description="[m] the same while walking: a plan that counts on the toes puts the next step too near"
     )
     alarm_urgency: float = Field(
         100.0, ge=1, description="factor on velocity_cost and position_cost when the capture point is far off the plan"
