@@ -1,4 +1,4 @@
-"""What the tasks ask of the feet: soles never overlap, velocities are met, one step per step task, stops are aligned."""
+"""What the tasks ask of the feet: no overlapping soles, the right velocity, one step per step task, aligned stops."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def walked(walker: Stepping, feet: Feet, count: int, time: float = 1.0) -> tuple
 
 
 def gap(a: Vector, b: Vector) -> float:
-    """Distance between two convex polygons (n, 2), counter-clockwise, along their best separating edge; ≤ 0: they overlap."""
+    """Distance of two convex polygons (n, 2) along their best separating edge; ≤ 0: they overlap."""
     best = -np.inf
     for one, other in ((a, b), (b, a)):
         for start, end in zip(one, np.roll(one, -1, axis=0), strict=True):
@@ -68,7 +68,7 @@ def test_mean_velocity_over_a_cycle_is_the_command(vx: float, vy: float, yaw: fl
 
 @given(omega=st.floats(0.05, 0.6), sign=st.sampled_from([-1.0, 1.0]), vx=st.floats(-0.1, 0.1))
 def test_turning_meets_its_rate_and_speed(omega: float, sign: float, vx: float) -> None:
-    """Over four cycles: the angle is exact, the way is the arc's but for the room that turned soles need: 8 cm of radius."""
+    """Over four cycles: the angle is exact, the way the arc's but for the room that turned soles need."""
     _, stances = walked(stepping(walk((0.0, vx, 0.0, sign * omega))), feet_at(), 10)
     a, b = stances[2], stances[10]
     angle = float(b.yaws.mean() - a.yaws.mean())

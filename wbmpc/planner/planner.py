@@ -95,16 +95,16 @@ class Planner:
         plane = polygon.plane_height
         mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
 
-        stride, times = self._gait.stride, preview.times
+        stride = self._gait.stride
         full_pace, full_sigma = references.palms(state.time, None, pace=1.0)
         gated, sigma = references.palms(state.time, contacts)
-        foot, gated_foot = np.zeros(preview.steps), np.zeros(preview.steps)
-        if stride is not None:
-            foot, gated_foot = stride.shares(times, rate=1.0), stride.shares(times, rate=self._gate)
+        foot, gated_foot = self._gait.shares(preview.times, 1.0), self._gait.shares(preview.times, self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
         wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot))
-        height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
+        height, solution = self._height_stage.plan(
+            self._com.value[2], wanted=wanted - self._gait.crouch, band=band, plane=plane
+        )
         stage1 = _stage_report(solution, begin)
 
         begin = perf_counter()
@@ -280,13 +280,12 @@ class Planner:
 
         The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
         """
-        settings, alarm = self._settings.whole_body, self._com.alarm
+        settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
         margin = settings.zmp_margin + alarm * (settings.zmp_margin_alarm - settings.zmp_margin)
 
         def preview(rate: float, margin: float) -> SupportPreview:
-            return self._gait.preview(
-                time,
-                self._preview.times,
+            return gait.preview(
+                *(time, self._preview.times),
                 rate=rate,
                 margin=margin,
                 growth=settings.zmp_margin_growth,
@@ -294,7 +293,7 @@ class Planner:
             )
 
         judged = preview(1.0, settings.zmp_margin)
-        return judged, judged if self._gate >= 1.0 and alarm == 0.0 else preview(self._gate, margin)
+        return judged, judged if self._gate >= 1.0 and not alarm else preview(self._gate, margin)
 
 
 def _stage_report(solution: QpSolution, start: float) -> StageReport:

@@ -22,8 +22,7 @@ class Stepping:
     """The footsteps that the tasks ask for, one at a time.
 
     A velocity command puts each foot where the body will need it (Herdt et al. 2010): the foot on the side of a
-    sideways motion takes all of it, that on the side of a turn the turn, and the other one closes up, so that legs never
-    cross.
+    sideways motion takes all of it, that on the side of a turn the turn, and the other one closes up: legs never cross.
     """
 
     def __init__(self, tasks: tuple[Task, ...], settings: GaitSettings, footholds: Footholds) -> None:
@@ -157,7 +156,7 @@ class Stepping:
             double_support=settings.double_support,
             clearance=settings.step_height,
             lead=0.06,
-            adaptable=settings.adapt_footsteps,
+            adaptable=True,
             task=self._walks[0][0],
         )
 
