@@ -104,9 +104,9 @@ def test_a_second_contact_joins_a_first_that_turns_out_too_weak() -> None:
     given = scenario(
         "two_hands", patches=patches, world__objects={"shelf": shelf, "ghost": ghost}, checks=[{"kind": "withdrawn"}]
     )
-    result = run(given, 6.5)
+    result = run(given, 7.0)
     joined = result.fired[-1]
     assert [c.patch for c in result.fired[0].candidates if c.chosen] == ["left", "ghost"]
     assert [c.patch for c in joined.candidates if c.chosen] == ["right"]
     assert {c.reason for c in joined.candidates if c.patch == "left" and c.hand == 0} == {"held already"}
-    assert (result.reports[-1].contact_phase == P.LOADED).all()
+    assert any((report.contact_phase == P.LOADED).all() for report in result.reports)
