@@ -20,7 +20,7 @@ class Footstep:
     double_support: float  # [s] before the foot is lifted, when it follows another step
     clearance: float  # [m] how high the foot is lifted
     lead: float  # share of the swing in which the foot only rises, and at its end only sinks: 0 … 0.4
-    adaptable: bool  # whether stage 2 may move it
+    adaptable: bool  # a walking step: stage 2 may move it, its swing does not wait for the CoM
     task: int  # index of the task that asks for it
 
     def share(self, sigma: Vector) -> Vector:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -11,7 +10,8 @@ from wbmpc.planner.footstep import Feet, Footstep, SoleReferences
 from wbmpc.planner.settings import GaitSettings
 from wbmpc.planner.stepping import SIDE_SIGN, Stepping, turning_room
 from wbmpc.planner.stride import Stride
-from wbmpc.planner.support import SupportPolygon, foot_corners
+from wbmpc.planner.support import SupportPolygon
+from wbmpc.planner.support_interval import Interval, Transfer
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.swing import Swing
 from wbmpc.rotations import angle_difference
@@ -28,16 +28,6 @@ class SupportPhase(IntEnum):
     STAND = 0  # both feet, no step ahead
     DOUBLE = 1  # both feet, a step ahead
     SINGLE = 2  # one foot, the other swings
-
-
-@dataclass(frozen=True, slots=True)
-class _Interval:
-    """One phase of the horizon: until `end` [s from now] the robot stands on `feet`."""
-
-    end: float
-    feet: Feet
-    swing: int  # side of the foot in the air, -1: none
-    moved: tuple[int, int]  # number of the footstep that each foot stands on; -1: it stands there already
 
 
 class Gait:
@@ -79,6 +69,17 @@ class Gait:
             return None
         return Stride(step, self.feet, self.swing, self._left)
 
+    def shares(self, times: Vector, rate: float) -> Vector:
+        """Shares (n,) of a stride's way done `times` (n,) seconds from now at `rate`; 0 without one."""
+        stride = self.stride
+        return np.zeros(len(times)) if stride is None else stride.shares(times, rate=rate)
+
+    @property
+    def crouch(self) -> float:
+        """How much lower than a standing CoM that of a walk is [m]; 0 when not walking."""
+        step = self.step if self.swing is None else self.swing.step
+        return self._settings.crouch if step is not None and step.adaptable else 0.0
+
     # ------------------------------------------------------------------ one plan later
 
     def advance(
@@ -119,7 +120,7 @@ class Gait:
 
     def aim(self, shift: Vector, dt: float) -> None:
         """Move the landing place by what stage 2 has decided, `shift` (2,) [m] from the step's own place."""
-        if self.swing is not None and self.swing.step.adaptable:
+        if self.swing is not None and self.swing.step.adaptable and self._settings.adapt_footsteps:
             self.swing.move_target(self.swing.step.position[:2] + shift, dt)
 
     def _lift(self, step: Footstep, events: list[str]) -> None:
@@ -144,7 +145,8 @@ class Gait:
         self._stepping.landed(step)
         self.step = self._stepping.next(self.feet, time)
         self.phase = SupportPhase.DOUBLE if self.step else SupportPhase.STAND
-        self._left = self.step.double_support if self.step else 0.0
+        early = self._left if step.adaptable else 0.0  # a walk keeps its beat: the plan counts on it
+        self._left = self.step.double_support + early if self.step else 0.0
         x, y = sole[:2]
         events.append(f"foot {SIDES[step.side]}: landed at ({x:.3f}, {y:.3f})")
 
@@ -164,27 +166,32 @@ class Gait:
         """
         intervals, steps = self._intervals(time, float(times[-1]), rate)
         n, m = len(times), MAX_FOOTSTEPS
-        shift, rest_shift = np.zeros((n, m)), np.zeros(m)
+        shift = np.zeros((n, m))
         com_reference, com_velocity = np.empty((n, 2)), np.empty((n, 2))
         polygons: list[SupportPolygon] = []
         centring = np.zeros(n)
-        made: dict[int, SupportPolygon] = {}
+        made: dict[int, SupportPolygon] = {}  # of the intervals that have one for all their knots
         which = 0
         for k, t in enumerate(times):
             while which < len(intervals) - 1 and t > intervals[which].end + 1e-9:
                 which += 1
             interval = intervals[which]
-            if which not in made:
-                made[which] = _polygon(interval, half_extents, margin)
-            polygons.append(made[which].shrunk(growth * t))
-            _share(interval, shift[k])
-            centring[k] = float(interval.swing >= 0)
+            moving = interval.weights(t) is not None
+            if moving or which not in made:
+                polygon = interval.polygon(t, half_extents=half_extents, margin=margin)
+                if not moving:
+                    made[which] = polygon
+            else:
+                polygon = made[which]
+            polygons.append(polygon.shrunk(growth * t))
+            shift[k] = interval.shares(t, m)
+            centring[k] = float(moving or interval.swing >= 0)
             com_reference[k] = interval.feet.positions[:, :2].mean(axis=0)
             com_velocity[k] = self._stepping.velocity(interval.feet, time + t)
         last = intervals[which]
         both = last if last.swing < 0 else intervals[min(which + 1, len(intervals) - 1)]
-        rest = _polygon(_Interval(0.0, both.feet, -1, both.moved), half_extents, margin + growth * float(times[-1]))
-        _share(_Interval(0.0, both.feet, -1, both.moved), rest_shift)
+        at_rest = Interval(NEVER, both.feet, -1, both.moved)
+        rest = at_rest.polygon(0.0, half_extents=half_extents, margin=margin + growth * float(times[-1]))
         lower, upper, axes, placement_lower, placement_upper, places = self._bounds(steps)
         return SupportPreview(
             normals=np.array([p.normals for p in polygons]),
@@ -195,7 +202,7 @@ class Gait:
             centring=centring,
             rest_normals=rest.normals,
             rest_offsets=rest.offsets,
-            rest_shift=rest_shift,
+            rest_shift=at_rest.shares(0.0, m),
             footsteps=places,
             placement_axes=axes,
             placement_lower=placement_lower,
@@ -210,24 +217,27 @@ class Gait:
         """What carries the robot where its task ends: the stance foot when a foot is put somewhere, else both feet."""
         stride = self.stride
         swing = -1 if stride is None else stride.step.side
-        return _polygon(_Interval(NEVER, self.feet, swing, (-1, -1)), half_extents, margin)
+        return Interval(NEVER, self.feet, swing, (-1, -1)).polygon(0.0, half_extents=half_extents, margin=margin)
 
-    def _intervals(self, time: float, horizon: float, rate: float) -> tuple[list[_Interval], list[Footstep]]:
+    def _intervals(self, time: float, horizon: float, rate: float) -> tuple[list[Interval], list[Footstep]]:
         """Phases until the horizon [s] and the footsteps made in them, at most MAX_FOOTSTEPS."""
         feet, moved = self.feet, (-1, -1)
         steps: list[Footstep] = []
         made: tuple[int, ...] = ()
         if self.phase == SupportPhase.STAND or (self.step is None and self.swing is None):
-            return [_Interval(NEVER, feet, -1, moved)], steps
+            return [Interval(NEVER, feet, -1, moved)], steps
         end = min(self._left / max(rate, 1e-6), NEVER)
-        intervals: list[_Interval] = []
+        intervals: list[Interval] = []
         step = self.step if self.swing is None else self.swing.step
         if self.swing is None:
-            intervals.append(_Interval(end, feet, -1, moved))
             assert step is not None
+            transfer = _transfer(step, feet, end)
+            if transfer and feet.last < 0 and transfer.begin > 0.0:
+                intervals.append(Interval(transfer.begin, feet, -1, moved))
+            intervals.append(Interval(end, feet, -1, moved, transfer))
             end += step.swing_time
         while step is not None and len(steps) < MAX_FOOTSTEPS:
-            intervals.append(_Interval(end, feet, step.side, moved))
+            intervals.append(Interval(end, feet, step.side, moved))
             moved = (len(steps), moved[1]) if step.side == 0 else (moved[0], len(steps))
             steps.append(step)
             made += (step.task,)
@@ -236,10 +246,10 @@ class Gait:
                 break
             step = self._stepping.next(feet, time + end, made=made)
             end = end + step.double_support if step else NEVER
-            intervals.append(_Interval(end, feet, -1, moved))
+            intervals.append(Interval(end, feet, -1, moved, _transfer(step, feet, end) if step else None))
             if step is not None:
                 end += step.swing_time
-        intervals.append(_Interval(NEVER, feet, -1, moved))
+        intervals.append(Interval(NEVER, feet, -1, moved))
         return intervals, steps
 
     def _bounds(self, steps: list[Footstep]) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
@@ -255,7 +265,7 @@ class Gait:
             c, s = np.cos(feet.yaws[stance]), np.sin(feet.yaws[stance])
             axes[j] = [[c, s], [-s, c]]
             nominal = axes[j] @ (step.position - feet.positions[stance])[:2]
-            if step.adaptable:
+            if step.adaptable and settings.adapt_footsteps:
                 narrowest = settings.narrowest + turning_room(settings, step.yaw - float(feet.yaws[stance]))
                 widths = sorted((SIDE_SIGN[step.side] * narrowest, SIDE_SIGN[step.side] * settings.widest))
                 low, high = np.array([-settings.longest, widths[0]]), np.array([settings.longest, widths[1]])
@@ -263,29 +273,17 @@ class Gait:
                 placement_upper[j] = np.maximum(high, nominal) - nominal
                 lower[j], upper[j] = -0.3, 0.3
             feet = feet.after(step)
-        if self.swing is not None and self.swing.step.adaptable:
+        if self.swing is not None and self.swing.step.adaptable and settings.adapt_footsteps:
             reach = settings.foot_speed * self._left
             offset = self.swing.target[:2] - self.swing.step.position[:2]
             lower[0], upper[0] = offset - reach, offset + reach
         return lower, upper, axes, placement_lower, placement_upper, places
 
 
-def _polygon(interval: _Interval, half_extents: Vector, margin: float) -> SupportPolygon:
-    feet = interval.feet
-    standing = [side for side in range(2) if side != interval.swing]
-    corners = np.vstack(
-        [
-            foot_corners(position=feet.positions[side], yaw=float(feet.yaws[side]), half_extents=half_extents)
-            for side in standing
-        ]
-    )
-    plane = float(feet.positions[standing, 2].mean())
-    return SupportPolygon.of_corners(corners, margin=margin, plane_height=plane)
-
-
-def _share(interval: _Interval, shift: Vector) -> None:
-    """Write the share of each footstep's displacement by which the interval's polygon moves into `shift`."""
-    standing = [side for side in range(2) if side != interval.swing]
-    for side in standing:
-        if interval.moved[side] >= 0:
-            shift[interval.moved[side]] += 1.0 / len(standing)
+def _transfer(step: Footstep, feet: Feet, end: float) -> Transfer | None:
+    """How the load goes to the foot that stays, before a walking `step` from `feet` that lifts at `end` [s]."""
+    if not step.adaptable:
+        return None
+    shares = ((1.0, 0.0), (0.0, 1.0))
+    before = (0.5, 0.5) if feet.last < 0 else shares[1 - feet.last]
+    return Transfer(end - step.double_support, before, shares[1 - step.side])

@@ -12,6 +12,7 @@ from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
 from wbmpc.planner.stride import Stride
 from wbmpc.robot import Robot
+from wbmpc.rotations import angle_difference
 from wbmpc.scenario import ComHeightTask, LeanTask, ReachTask, Task
 from wbmpc.signals import SIDES, HandMode, Vector
 
@@ -225,9 +226,10 @@ class References:
         return tasks if self._stride is None else max(tasks, self._stride.sigma)
 
     def torso_heading(self, contacts: Contacts, feet: float) -> float:
-        """Yaw of the torso [rad]: the feet's, `feet`, or as in the postures of contacts and task."""
-        base = feet if contacts.posture is None else contacts.posture.torso_heading
-        return base + self._sigma * (self._goal.torso_heading - base)
+        """Yaw of the torso [rad]: the feet's, `feet`, or as in those postures."""
+        braced = contacts.posture
+        base = feet if braced is None else feet + angle_difference(braced.torso_heading, feet)
+        return base + self._sigma * angle_difference(self._goal.torso_heading, base)
 
     def spent(self, contacts: Contacts) -> tuple[int, ...]:
         """Sides of contacts that a stride's end leaves out of the palm's reach."""

@@ -40,7 +40,7 @@ class WholeBodySettings(StrictModel):
     velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(5e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
-    footstep_cost: float = Field(50.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
+    footstep_cost: float = Field(1000.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
     zmp_centre_cost: float = Field(
         50.0, ge=0, description="[cost / m²] a ZMP off the centre of the foot that carries a step alone"
     )
@@ -71,6 +71,7 @@ class GaitSettings(StrictModel):
     first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
     stride_double_support: float = Field(1.0, gt=0.1, description="[s] before a step that is planned with a posture")
     step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
+    crouch: float = Field(0.015, ge=0, description="[m] by which a walking CoM is lower: legs need length to step out")
     step_width: float = Field(0.09, gt=0, description="[m] between the soles' centres when walking")
     turning_room: float = Field(
         0.07, ge=0, description="[m] by which that width grows with the sine of the angle between the soles"

@@ -156,7 +156,7 @@ class Stepping:
             double_support=settings.double_support,
             clearance=settings.step_height,
             lead=0.06,
-            adaptable=settings.adapt_footsteps,
+            adaptable=True,
             task=self._walks[0][0],
         )
 
