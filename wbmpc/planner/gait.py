@@ -246,7 +246,7 @@ class Gait:
                 break
             step = self._stepping.next(feet, time + end, made=made)
             end = end + step.double_support if step else NEVER
-            intervals.append(Interval(end, feet, -1, moved, step and _transfer(step, feet, end)))
+            intervals.append(Interval(end, feet, -1, moved, _transfer(step, feet, end) if step else None))
             if step is not None:
                 end += step.swing_time
         intervals.append(Interval(NEVER, feet, -1, moved))
