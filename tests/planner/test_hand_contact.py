@@ -31,7 +31,8 @@ class Bench:
         self.contact = HandContact(1, SETTINGS, palm_radius=RADIUS)
         self.surface = surface  # [m] real height of the table; None: absent
         self.stuck = stuck  # the palm does not move at all
-        self.palm = HOME.copy()
+        self.palm, self.palm_velocity = HOME.copy(), np.zeros(3)
+        self.urgency = 0.0
         self.pressing = 0.0  # [N] what the tracker makes of a held contact
         self.needed, self.quiet = True, False
         self.wanted = 5.0
@@ -48,8 +49,8 @@ class Bench:
     def step(self) -> None:
         contact = self.contact
         outcome = contact.advance(
-            DT, palm=self.palm, force=self.force(), wanted_force=self.wanted, needed=self.needed, quiet=self.quiet,
-            home=HOME,
+            DT, palm=self.palm, palm_velocity=self.palm_velocity, force=self.force(), wanted_force=self.wanted,
+            needed=self.needed, quiet=self.quiet, urgency=self.urgency, home=HOME,
         )  # fmt: skip
         if outcome:
             self.outcomes.append(outcome)
@@ -75,7 +76,7 @@ class Bench:
     def choose(self) -> None:
         self.contact.need(True)
         assert self.contact.phase == NEEDED
-        self.contact.choose(PATCH, palm=self.palm)
+        self.contact.choose(PATCH, palm=self.palm, palm_velocity=self.palm_velocity)
 
     def run_to(self, phase: ContactPhase, seconds: float = 6.0) -> float:
         used = self.run(seconds, lambda: self.contact.phase == phase)
@@ -125,7 +126,7 @@ def test_what_others_read_in_each_phase() -> None:
     look()
     bench.contact.need(True)
     look()
-    bench.contact.choose(PATCH, palm=bench.palm)
+    bench.contact.choose(PATCH, palm=bench.palm, palm_velocity=bench.palm_velocity)
     look()
     for k in range(1500):
         bench.quiet, bench.needed = k > 600, k <= 600
@@ -218,7 +219,15 @@ def test_a_contact_that_carries_nothing_because_nothing_is_asked_is_not_lost() -
     bench.wanted = 0.0
     for _ in range(100):
         bench.contact.advance(
-            DT, palm=bench.palm, force=np.zeros(3), wanted_force=0.0, needed=True, quiet=False, home=HOME
+            DT,
+            palm=bench.palm,
+            palm_velocity=np.zeros(3),
+            force=np.zeros(3),
+            wanted_force=0.0,
+            needed=True,
+            quiet=False,
+            urgency=0.0,
+            home=HOME,
         )
     assert bench.contact.phase == LOADED
 
@@ -306,3 +315,42 @@ def test_reference_velocity_is_the_derivative_of_its_position() -> None:
     kink = np.linalg.norm(velocities[1:] - velocities[:-1], axis=1) > 0.03  # where the descent begins
     assert kink.sum() <= 2
     assert_allclose(middle[~kink], mean[~kink], atol=4e-3)
+
+
+class UrgentBench(Bench):
+    """The same with the alarm on; the palm obeys accelerations, and the body carries it along at `drift` [m/s²]."""
+
+    def __init__(self, *, velocity: Vector, drift: Vector) -> None:
+        super().__init__()
+        self.urgency, self.palm_velocity, self.drift = 1.0, velocity.copy(), drift
+
+    def land(self) -> tuple[float, float]:
+        """Time [s] and speed into the surface [m/s] of the touch."""
+        self.step()  # the contact hears of the alarm
+        self.contact.choose(PATCH, palm=self.palm, palm_velocity=self.palm_velocity)
+        fine = DT / 10
+        for k in range(5000):
+            if k % 10 == 0:
+                self.contact.advance(
+                    DT, palm=self.palm, palm_velocity=self.palm_velocity, force=np.zeros(3), wanted_force=0.0,
+                    needed=True, quiet=False, urgency=1.0, home=HOME,
+                )  # fmt: skip
+                acceleration = self.contact.reference()[2] + self.drift
+            self.palm_velocity = self.palm_velocity + fine * acceleration
+            self.palm = self.palm + fine * self.palm_velocity
+            if (self.palm - PATCH.position) @ PATCH.normal < RADIUS:
+                return (k + 1) * fine, -float(self.palm_velocity @ PATCH.normal)
+        raise AssertionError("never touched")
+
+
+@given(
+    velocity=st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array),
+    drift=st.tuples(*[st.floats(-3, 3)] * 3).map(np.array),
+)
+def test_an_urgent_palm_is_there_in_time_and_softly_wherever_the_body_carries_it(
+    velocity: Vector, drift: Vector
+) -> None:
+    way = float(np.linalg.norm(PATCH.position + RADIUS * PATCH.normal - HOME))
+    time, speed = UrgentBench(velocity=velocity, drift=drift).land()
+    assert time < 1.6 * np.sqrt(6.0 * way / SETTINGS.urgent_acceleration)
+    assert 0.0 < speed < 3.0 * SETTINGS.urgent_touch_speed

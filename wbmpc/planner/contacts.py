@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.planner.candidates import COM_COST, Candidates
+from wbmpc.planner.candidates import Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
@@ -18,6 +18,7 @@ from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
 
 RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
+TOGETHER_COST = 50.0  # [cost / m²] how hard the posture with both hands on their patches keeps its CoM over the feet
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
 NOT_RUN = StageReport(SolveStatus.NOT_RUN, 0.0, 0)
 
@@ -43,7 +44,7 @@ class Contacts:
         self._force_stage = ContactForce(
             len(times), contact, mass=robot.mass, contacts=len(SIDES), backend=settings.qp_backend
         )
-        self._together = Posture(robot, nominal=nominal, com_cost=COM_COST)
+        self._together = Posture(robot, nominal=nominal, com_cost=TOGETHER_COST)
         self.forces = np.zeros((len(SIDES), len(times), 3))  # [N] planned, in world
         self._needed, self._quiet = False, True  # of the shift as a whole
         self._short = False  # the contacts there are cannot give it

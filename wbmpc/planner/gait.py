@@ -69,6 +69,11 @@ class Gait:
             return None
         return Stride(step, self.feet, self.swing, self._left)
 
+    def shares(self, times: Vector, rate: float) -> Vector:
+        """Shares (n,) of a stride's way done `times` (n,) seconds from now at `rate`; 0 without one."""
+        stride = self.stride
+        return np.zeros(len(times)) if stride is None else stride.shares(times, rate=rate)
+
     @property
     def walking(self) -> bool:
         """Whether the step ahead or under way is one of a walk."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from wbmpc.planner.hand_path import HandPath, Landing
@@ -13,7 +15,7 @@ from wbmpc.signals import ContactPhase, HandMode, Vector
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
-STOPPED_HEIGHT, STOPPED_SPEED = 0.012, 0.05  # [m], [m/s] a palm slower than this so near has touched
+STOPPED_HEIGHT, STOPPED_SPEED = 0.008, 0.05  # [m], [m/s] a palm slower than this so near has touched
 STANDOFF = 0.004  # [m] above the surface at which it has its landing speed
 SHORTEST = 0.4  # [s] least time of a careful approach
 LAST_AIM = 0.03  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
@@ -199,6 +201,8 @@ class HandContact:
                 dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home
             )
         elif phase == ContactPhase.RELEASED:
+            if self._path is not None:  # the torso moves on while the hand is on its way
+                self._path = replace(self._path, start=home.copy())
             self._sigma += self._rate * dt
             if self._sigma <= 0.0:
                 self.patch = None
@@ -269,8 +273,8 @@ class HandContact:
         normal = self.patch.normal
         arrival = -self._pace.touch_speed * normal
         left = self._duration - self._clock
-        height = STANDOFF if left > 0.0 else -0.5 * self._settings.search_depth
-        end = self.patch.position + (self._radius + height) * normal
+        beyond = max(LAST_AIM - left, 0.0)  # [s] past the end of its way it goes on at its landing speed
+        end = self.patch.position + (self._radius + STANDOFF) * normal + beyond * arrival
         left = max(left, LAST_AIM)
         self._landing = Landing(
             start=palm.copy(), velocity=palm_velocity.copy(), end=end, arrival=arrival, duration=left, normal=normal

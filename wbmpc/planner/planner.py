@@ -98,10 +98,7 @@ class Planner:
         stride = self._gait.stride
         full_pace, full_sigma = references.palms(state.time, None, pace=1.0)
         gated, sigma = references.palms(state.time, contacts)
-        foot, gated_foot = (
-            np.zeros(preview.steps) if stride is None else stride.shares(preview.times, rate=r)
-            for r in (1.0, self._gate)
-        )
+        foot, gated_foot = self._gait.shares(preview.times, 1.0), self._gait.shares(preview.times, self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, plane)
         wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)) - self._gait.crouch

@@ -28,6 +28,7 @@ class TrackerSettings(StrictModel):
     torso_damping: float = Field(12.0, ge=0, description="[1/s]")
     torso_weight: float = Field(0.1, ge=0)
     stance_damping: float = Field(30.0, ge=0, description="[1/s] of a stance foot's and a braced palm's velocity")
+    stance_stiffness: float = Field(60.0, ge=0, description="[1/s²] of a stance foot's place: it matters in the air")
     stance_weight: float = Field(1000.0, gt=0)
     swing_stiffness: float = Field(250.0, ge=0, description="[1/s²]")
     swing_damping: float = Field(30.0, ge=0, description="[1/s]")
@@ -45,7 +46,7 @@ class TrackerSettings(StrictModel):
     posture_damping: float = Field(12.0, ge=0, description="[1/s]")
     posture_weight: float = Field(0.02, gt=0)
     hand_force_weight: float = Field(0.02, ge=0, description="[cost / N²] of a hand's force against its plan")
-    hand_force_rise: float = Field(8.0, gt=0, description="[N] by which a planned palm force may exceed the sensed one")
+    hand_force_rise: float = Field(5.0, gt=0, description="[N] by which a planned palm force may exceed the sensed one")
     force_regularization: float = Field(1e-4, gt=0, description="[cost / N²] of every contact force")
     acceleration_regularization: float = Field(1e-4, gt=0, description="[cost / (rad/s²)²] of every joint")
 

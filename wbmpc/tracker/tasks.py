@@ -88,6 +88,9 @@ class TaskStack:
         if setpoint.foot_stance[side]:
             self.weight[rows] = s.stance_weight
             self.target[rows] = -s.stance_damping * velocity - kinematics.drift(frame)
+            # a push may lift a stance foot; damping alone lets it drift, into the other foot
+            away = setpoint.foot_position[side] - kinematics.position(frame)
+            self.target[rows][:2] += s.stance_stiffness * away[:2]
             return
         self.weight[rows] = s.swing_weight
         level = level_frame(setpoint.foot_yaw[side])
