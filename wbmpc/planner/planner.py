@@ -117,7 +117,6 @@ class Planner:
             torso_up=references.torso_up(contacts),
             torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
         )
-        urgency = 1.0 + self._haste * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
             stage: WholeBodyStage, com: Vector, zmp: ZmpModel, support: SupportPreview, com_band: Vector
@@ -129,7 +128,7 @@ class Planner:
                 com_band=com_band,
                 tasks=tasks,
                 velocity_time=self._period,
-                urgency=urgency,
+                urgency=1.0 + self._haste * (settings.whole_body.alarm_urgency - 1.0),
             )
 
         model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
@@ -282,8 +281,7 @@ class Planner:
         The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
         """
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
-        loudest = settings.zmp_margin_step if gait.walking else settings.zmp_margin_alarm
-        margin = settings.zmp_margin + alarm * (loudest - settings.zmp_margin)
+        margin = self._com.inset(walking=gait.walking)
 
         def preview(rate: float, margin: float) -> SupportPreview:
             return gait.preview(
