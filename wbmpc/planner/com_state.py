@@ -41,6 +41,12 @@ class ComState:
         ahead[:2, 1] += self.alarm * PUSH_TIME * self._push
         return ahead
 
+    def inset(self, *, walking: bool) -> float:
+        """Inset of the support polygon [m], smaller the louder the alarm."""
+        settings = self._settings.whole_body
+        alarmed = settings.zmp_margin_step if walking else settings.zmp_margin_alarm
+        return settings.zmp_margin + self.alarm * (alarmed - settings.zmp_margin)
+
     def filter(self, velocity: Vector) -> None:
         """Take in a measured CoM velocity (3,) [m/s]."""
         if np.isfinite(velocity).all():  # one broken measurement must not stay in the filter

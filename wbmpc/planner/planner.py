@@ -117,9 +117,6 @@ class Planner:
             torso_up=references.torso_up(contacts),
             torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
         )
-        # a robot that steps is not to stop, its coming steps catch it
-        alarm = self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
-        urgency = 1.0 + alarm * (settings.whole_body.alarm_urgency - 1.0)
 
         def stage_2(
             stage: WholeBodyStage, com: Vector, zmp: ZmpModel, support: SupportPreview, com_band: Vector
@@ -131,7 +128,7 @@ class Planner:
                 com_band=com_band,
                 tasks=tasks,
                 velocity_time=self._period,
-                urgency=urgency,
+                urgency=1.0 + self._haste * (settings.whole_body.alarm_urgency - 1.0),
             )
 
         model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
@@ -240,7 +237,7 @@ class Planner:
             palm_velocities=self._measured.palm_velocities,
             palm_forces=state.palm_force_in_world,
             homes=self._measured.palm_homes,
-            urgency=self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0,
+            urgency=self._haste,
             events=events,
         )
         asked, self._asked = self._asked, self._gait.feet if self._gait.stride is not None else None
@@ -264,6 +261,11 @@ class Planner:
             soles=feet.positions, yaws=feet.yaws, centre=centre, iterations=iterations, everyone=everyone
         )
 
+    @property
+    def _haste(self) -> float:
+        """The alarm of a robot that stands; one that steps is not to stop, its coming steps catch it."""
+        return self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
+
     def _goal_need(self, mass: float) -> Need | None:
         """The need where the current task ends, on the feet that will carry it; None without such a task."""
         com = self._references.goal_com
@@ -279,8 +281,7 @@ class Planner:
         The feet may use their edges the louder the alarm; a hand takes its time, and is called by the usual inset.
         """
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
-        loudest = settings.zmp_margin_step if gait.walking else settings.zmp_margin_alarm
-        margin = settings.zmp_margin + alarm * (loudest - settings.zmp_margin)
+        margin = self._com.inset(walking=gait.walking)
 
         def preview(rate: float, margin: float) -> SupportPreview:
             return gait.preview(
