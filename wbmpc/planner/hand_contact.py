@@ -193,8 +193,7 @@ class HandContact:
                 dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home
             )
         elif phase == ContactPhase.RELEASED:
-            if self._path is not None:  # the torso moves on while the hand is on its way
-                self._path = replace(self._path, start=home.copy())
+            self._path = self._path and replace(self._path, start=home.copy())  # the torso moves on meanwhile
             self._sigma += self._rate * dt
             if self._sigma <= 0.0:
                 self.patch = None
