@@ -40,7 +40,7 @@ class WholeBodySettings(StrictModel):
     velocity_cost: float = Field(0.1, ge=0, description="[cost / (m/s)²] damping of the CoM over the horizon")
     position_cost: float = Field(5e-2, ge=0, description="[cost / m²] pull of the CoM to the support's centre")
     reach_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of a hand beyond its reach |R - C| <= d")
-    footstep_cost: float = Field(200.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
+    footstep_cost: float = Field(1000.0, gt=0, description="[cost / m²] a footstep away from where the task puts it")
     zmp_centre_cost: float = Field(
         50.0, ge=0, description="[cost / m²] a ZMP off the centre of the foot that carries a step alone"
     )
