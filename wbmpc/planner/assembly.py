@@ -44,7 +44,8 @@ def assemble(
     caps = np.array([c.caps(np.array([0.0, period])) for c in contacts])  # now and one plan later
     for side, mode in enumerate(modes):  # a palm on its way to a surface must come near it, one on it holds the arm too
         if mode != HandMode.FREE:
-            arm_keep_out[side, : 1 if mode == HandMode.MOVE else None, 3] = -np.inf
+            careful = mode == HandMode.MOVE and not contacts[side].hurried
+            arm_keep_out[side, : (1 if careful else None), 3] = -np.inf
     return Plan(
         time=report.time,
         step=step,
