@@ -9,7 +9,7 @@ import numpy as np
 from wbmpc.planner.contact_choice import ContactChoice, Option
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.pace import hurried, way_time
-from wbmpc.planner.posture import Posture
+from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
@@ -17,6 +17,7 @@ from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vector
 
 COM_COST = 4.0  # [cost / m²] how hard a candidate's posture keeps its CoM over the feet
+ELBOW_TOLERANCE = 0.015  # [m] of its posture's elbow under the clearance: the forearm would meet the surface
 COM_TOLERANCE = 0.004  # [m] how far outside the ZMP bounds a candidate's posture may have its CoM
 
 
@@ -29,9 +30,9 @@ class Candidate:
     posture: Posture
     excluded: bool = False  # it was chosen before and the contact did not appear
 
-    def goal(self, palm_radius: float) -> Vector:
-        """Palm centre (3,) when it rests on the patch [m]."""
-        return self.patch.position + palm_radius * self.patch.normal
+    def goal(self, palm_radius: float) -> PalmTarget:
+        """The palm when it rests on the patch."""
+        return PalmTarget(self.patch.position + palm_radius * self.patch.normal, self.patch.normal)
 
 
 class Candidates:
@@ -68,15 +69,16 @@ class Candidates:
         heading = float(np.mean(yaws))
         self._left = np.array([-np.sin(heading), np.cos(heading)])
         for candidate in turn:
-            palms: list[Vector | None] = [None, None]
+            palms: list[PalmTarget | None] = [None, None]
             palms[candidate.hand] = candidate.goal(self._robot.palm_radius)
             candidate.posture.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     def reach_slack(self, candidate: Candidate, polygon: SupportPolygon) -> float:
-        """Reach margin [m]: negative when the palm falls short, or the CoM would have to leave the ZMP's bounds."""
+        """Reach margin [m]: negative when the palm falls short, its elbow is too low, or the CoM must leave its bounds."""
         palm = self._settings.reach_margin - candidate.posture.residual
+        elbow = ELBOW_TOLERANCE - candidate.posture.elbow_excess
         com = COM_TOLERANCE - polygon.excess(candidate.posture.com)
-        return min(palm, com)
+        return min(palm, elbow, com)
 
     def choose(
         self,
@@ -162,7 +164,7 @@ class Candidates:
         reasons: dict[int, str] = {}
         for candidate in self.all:
             key, slack = id(candidate), self.reach_slack(candidate, polygon)
-            goal = candidate.goal(self._robot.palm_radius)
+            goal = candidate.goal(self._robot.palm_radius).position
             distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
             if any(option.patch is candidate.patch and option.hand == candidate.hand for option in held):
                 reasons[key] = "held already"

@@ -103,7 +103,7 @@ class Contacts:
             centre: (2,) where the CoM should rather be [m].
         """
         self.candidates.refresh(soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone)
-        palms = [c.goal for c in self.hands]
+        palms = [c.target for c in self.hands]
         if all(palm is not None for palm in palms):
             self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from wbmpc.planner.hand_path import HandPath
 from wbmpc.planner.pace import Pace
+from wbmpc.planner.posture import PalmTarget
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.urgent_approach import UrgentApproach
 from wbmpc.scenario import PatchPose
@@ -83,6 +84,11 @@ class HandContact:
         if self.patch is None or self.phase == ContactPhase.RELEASED:
             return None
         return self._touched if self.touching else self.patch.position + self._radius * self.patch.normal
+
+    @property
+    def target(self) -> PalmTarget | None:
+        """The same for a posture, with the surface's normal."""
+        return PalmTarget(self.goal, self.patch.normal) if self.goal is not None and self.patch is not None else None
 
     def reference(self) -> tuple[Vector, Vector, Vector]:
         """Palm position, velocity and acceleration (3,) to follow now; only when busy."""

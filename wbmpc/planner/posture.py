@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wbmpc.kinematics import Kinematics
@@ -9,7 +11,8 @@ from wbmpc.robot import Robot
 from wbmpc.rotations import heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
 
-SOLE_COST, PALM_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3.0, 2e-3
+SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 2e-3
+ELBOW_CLEARANCE = 0.03  # [m] of an elbow over the tangent plane through its palm: the forearm is as thick as the palm
 DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 PATIENCE = 120  # iterations for the same targets; what has not converged by then is out of reach
@@ -18,9 +21,17 @@ SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets a
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
+@dataclass(frozen=True, slots=True)
+class PalmTarget:
+    """Where a palm should be; on a surface with the outward `normal` (3,) its elbow stays above that surface."""
+
+    position: Vector  # (3,) [m] in world
+    normal: Vector | None = None
+
+
 class Posture:
-    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + w |c_xy − centre|² + 3 (c_z − nominal)²
-    + 2e-3 |posture error|².
+    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 3e2 Σ(elbow too low)² + w |c_xy − centre|²
+    + 3 (c_z − nominal)² + 2e-3 |posture error|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
     the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
@@ -38,6 +49,7 @@ class Posture:
         self.com = np.zeros(3)  # [m] of the last iterate
         self.palm_errors = np.zeros(2)  # [m] of the last iterate; 0 without a target
         self.residual = np.inf  # [m] largest palm or sole error of the last iterate
+        self.elbow_excess = 0.0  # [m] how far the lowest elbow is under its clearance at the last iterate
         self._reached: tuple[bool, ...] = ()  # which palms had a target
         self._targets: tuple[bytes, ...] = ()
         self._step = np.inf  # [rad, m] largest change of the last iteration
@@ -58,20 +70,20 @@ class Posture:
         """Yaw of the torso at the last iterate [rad]."""
         return heading_of(self._kinematics.rotation(self._robot.torso_frame))
 
-    def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[Vector | None], centre: Vector) -> None:
+    def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[PalmTarget | None], centre: Vector) -> None:
         """Run `count` iterations.
 
         Args:
             soles: (2, 3) sole positions in world [m].
             yaws: (2,) their headings [rad].
-            palms: wanted palm positions (3,) in world [m], left and right; None for a free hand.
+            palms: wanted places of the palms, left and right; None for a free hand.
             centre: (2,) where the CoM should rather be [m].
         """
         robot, kinematics, nv = self._robot, self._kinematics, self._robot.nv
         reached = tuple(p is not None for p in palms)
         if reached != self._reached:  # other hands: from the start, a neighbouring optimum can be a contorted one
             self.q, self._reached = self._nominal.copy(), reached
-        targets = (soles.tobytes(), yaws.tobytes(), centre.tobytes(), *(p.tobytes() for p in palms if p is not None))
+        targets = (soles.tobytes(), yaws.tobytes(), centre.tobytes(), *(p.position.tobytes() for p in palms if p is not None))
         if targets != self._targets:
             self._targets, self._step, self._left = targets, np.inf, PATIENCE
         for _ in range(count):
@@ -82,6 +94,7 @@ class Posture:
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
             self.residual = 0.0
+            self.elbow_excess = 0.0
             self.palm_errors[:] = 0.0
             for side, frame in enumerate(robot.sole_frames):
                 level = level_frame(yaws[side])
@@ -100,12 +113,21 @@ class Posture:
                 if target is None:
                     continue
                 J = kinematics.jacobian(frame)[:3]
-                error = target - kinematics.position(frame)
+                error = target.position - kinematics.position(frame)
                 self.palm_errors[side] = np.linalg.norm(error)
                 self.residual = max(self.residual, float(self.palm_errors[side]))
                 error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
                 H += PALM_COST * (J.T @ J)
                 g += PALM_COST * (J.T @ error)
+                if target.normal is not None:
+                    elbow = robot.elbow_frames[side]
+                    height = target.normal @ (kinematics.position(elbow) - kinematics.position(frame))
+                    excess = ELBOW_CLEARANCE - float(height)
+                    if excess > 0.0:
+                        self.elbow_excess = max(self.elbow_excess, excess)
+                        row = target.normal @ (kinematics.jacobian(elbow)[:3] - J)
+                        H += ELBOW_COST * np.outer(row, row)
+                        g += ELBOW_COST * excess * row
             self.com = kinematics.com
             J = kinematics.com_jacobian[:2]
             H += self._com_cost * (J.T @ J)

@@ -7,7 +7,7 @@ import numpy as np
 from wbmpc.planner.bands import horizontal_band
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.lean import Lean
-from wbmpc.planner.posture import Posture
+from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
 from wbmpc.planner.stride import Stride
@@ -93,12 +93,12 @@ class References:
         self._stand.iterate(iterations, soles=soles, yaws=yaws, palms=[None, None], centre=centre)
         if stride is not None:
             soles, yaws = stride.after.positions, stride.after.yaws
-        palms: list[Vector | None] = [c.goal for c in contacts.hands]
+        palms: list[PalmTarget | None] = [c.target for c in contacts.hands]
         for task in self._current:
             if isinstance(task, Lean):
                 centre = task.target
             else:
-                palms[task.side] = task.target
+                palms[task.side] = PalmTarget(task.target)
         if stride is not None or self._leaning is not None or any(palm is not None for palm in palms):
             self._goal.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
