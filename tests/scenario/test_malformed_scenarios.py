@@ -120,6 +120,18 @@ MISTAKES = [
         "tasks.0: ends at 14.5 s, the run already at 12 s (duration)",
     ),
     (
+        "leans while it reaches",
+        second_task("{kind: lean, target: [0.1, 0.0], start: 6.0, arrive_by: 7.0}"),
+        "{kind: lean",
+        "tasks.1: begins at 6 s, but tasks.0 (reach) lasts until 8.5 s",
+    ),
+    (
+        "leans before it starts",
+        second_task("{kind: lean, target: [0.1, 0.0], start: 9.0, arrive_by: 8.6, hold: 0.1}"),
+        "8.6",
+        "tasks.1.arrive_by: must be later than start (9 s), got 8.6 s",
+    ),
+    (
         "walks too fast",
         second_task("{kind: walk, commands: [{time: 1.0, velocity: [0.25, -0.25]}]}"),
         "[0.25, -0.25]",

@@ -67,6 +67,7 @@ OWN_BLOCKS = {
     "StandTask",
     "ComHeightTask",
     "HeightWaypoint",
+    "LeanTask",
     "ReachTask",
     "WalkTask",
     "VelocityCommand",

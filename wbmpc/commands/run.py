@@ -110,8 +110,8 @@ def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, 
         for place, result in results:
             index = order[place]
             outcome = broken(jobs[index], result.reason) if isinstance(result, Died) else result
+            yield index, outcome  # kept before it is announced: Ctrl-C may come with the line
             advance(outcome.line)
-            yield index, outcome
 
 
 def _report(ended: Sequence[tuple[Job, Outcome]], *, single: bool) -> None:

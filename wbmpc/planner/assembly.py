@@ -33,8 +33,7 @@ def assemble(
         velocity: stage 2's joint velocities (nv,).
         stance: which feet stand.
         modes: of both hands.
-        arm_keep_out: (2, 3, 4) half-spaces of the arms' points; those of a hand with a task are left out, it finds its
-            own way.
+        arm_keep_out: (2, 3, 4) half-spaces of the arms' points; those of a palm with a task are left out.
     """
     palm_position, palm_velocity = joints.palms(velocity)
     palm_acceleration = np.zeros((len(SIDES), 3))
@@ -43,7 +42,10 @@ def assemble(
             side = contact.side
             palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
     caps = np.array([c.caps(np.array([0.0, period])) for c in contacts])  # now and one plan later
-    arm_keep_out[[mode != HandMode.FREE for mode in modes], :, 3] = -np.inf
+    for side, mode in enumerate(modes):  # a palm on its way to a surface must come near it, one on it holds the arm too
+        if mode != HandMode.FREE:
+            careful = mode == HandMode.MOVE and not contacts[side].hurried
+            arm_keep_out[side, : (1 if careful else None), 3] = -np.inf
     return Plan(
         time=report.time,
         step=step,

@@ -18,7 +18,7 @@ from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
 
 RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
-TOGETHER_COST = 50.0  # [cost / m²] how hard the posture with both hands on their patches keeps its CoM over the feet
+TOGETHER_COST = 15.0  # [cost / m²] how hard the posture with both hands on their patches keeps its CoM over the feet
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
 NOT_RUN = StageReport(SolveStatus.NOT_RUN, 0.0, 0)
 

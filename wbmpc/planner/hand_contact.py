@@ -6,19 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from wbmpc.planner.hand_path import HandPath, Landing
+from wbmpc.planner.hand_path import HandPath
 from wbmpc.planner.pace import Pace
 from wbmpc.planner.settings import ContactSettings
+from wbmpc.planner.urgent_approach import UrgentApproach
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import ContactPhase, HandMode, Vector
 
 PATIENCE = 1.5  # [s] waited for the palm at the clearance point before the candidate is given up
 LOST_TIME = 0.15  # [s] without force after which a contact that should carry load is lost
 
-STOPPED_HEIGHT, STOPPED_SPEED = 0.008, 0.05  # [m], [m/s] a palm slower than this so near has touched
-STANDOFF = 0.004  # [m] above the surface at which it has its landing speed
 SHORTEST = 0.4  # [s] least time of a careful approach
-LAST_AIM = 0.03  # [s] an urgent hand is aimed at least so far ahead: nearer, noise would be magnified
 
 TOUCHING = (ContactPhase.SENSED, ContactPhase.LOADED, ContactPhase.QUIET, ContactPhase.UNLOADED)
 
@@ -43,7 +41,7 @@ class HandContact:
         self._unloaded_clock = 0.0
         self._urgency = 0.0  # 0 … 1, now
         self._pace = Pace.of(settings, 0.0)  # of the present approach
-        self._landing: Landing | None = None  # an urgent approach, as aimed at the last plan
+        self._urgent: UrgentApproach | None = None
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -93,9 +91,8 @@ class HandContact:
             return self._touched, zero, zero
         assert self._path is not None
         assert self.patch is not None
-        if self._landing is not None and self.hurried:
-            position, velocity, acceleration = self._landing.at(0.0)
-            return position, velocity, self._possible(acceleration)
+        if self._urgent is not None and self.hurried:
+            return self._urgent.reference()
         if self._descent >= 0.0:
             moving = self._descent < self._pace.clearance + self._settings.search_depth
             normal = self.patch.normal
@@ -109,8 +106,8 @@ class HandContact:
 
     def preview(self, times: Vector) -> Vector:
         """Palm references (n, 3) [m] at `times` (n,) seconds from now, while there is a goal to reach or hold."""
-        if self._landing is not None and self.hurried:
-            return np.array([self._landing.at(min(t, self._landing.duration))[0] for t in times])
+        if self._urgent is not None and self.hurried:
+            return self._urgent.preview(times)
         if self.touching or self._path is None or self._descent >= 0.0:
             return np.tile(self.reference()[0], (len(times), 1))
         return self._path.positions(np.clip(self._sigma + self._rate * times, 0.0, 1.0))
@@ -134,15 +131,10 @@ class HandContact:
         self._duration = max(SHORTEST, float(np.linalg.norm(clearance - palm)) / self._settings.approach_speed)
         self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
         self._enter(ContactPhase.CHOSEN)
-        self._landing = None
+        self._urgent = None
         if pace.hurried:
-            self._duration = Landing.shortest(
-                way=clearance - palm,
-                velocity=palm_velocity,
-                arrival=-pace.touch_speed * patch.normal,
-                acceleration=self._settings.urgent_acceleration,
-            )
-            self._aim(palm, palm_velocity)
+            self._urgent = UrgentApproach(patch, self._settings, radius=self._radius, palm=palm, velocity=palm_velocity)
+            self._duration = self._urgent.duration
 
     def release(self, *, palm: Vector, home: Vector) -> None:
         """Leave the surface (or give the approach up): lift along the normal and return to `home` (3,)."""
@@ -195,14 +187,13 @@ class HandContact:
         if phase == ContactPhase.CHOSEN:
             phase = self.phase = ContactPhase.APPROACHING  # the clock goes on
         if phase == ContactPhase.APPROACHING:
-            if self._landing is not None and normal_force <= settings.sensed_force:
-                self._aim(palm, palm_velocity)
+            if self._urgent is not None and normal_force <= settings.sensed_force:
+                self._urgent.aim(palm, palm_velocity, elapsed=self._clock)
             return self._approach(
                 dt, palm=palm, palm_velocity=palm_velocity, normal_force=normal_force, needed=needed, home=home
             )
         elif phase == ContactPhase.RELEASED:
-            if self._path is not None:  # the torso moves on while the hand is on its way
-                self._path = replace(self._path, start=home.copy())
+            self._path = self._path and replace(self._path, start=home.copy())  # the torso moves on meanwhile
             self._sigma += self._rate * dt
             if self._sigma <= 0.0:
                 self.patch = None
@@ -241,7 +232,8 @@ class HandContact:
             self.release(palm=palm, home=home)
             return None
         sensed = normal_force > settings.sensed_force and (self._descent >= 0.0 or self.hurried)
-        if sensed or (self.hurried and self._stopped(palm, palm_velocity)):
+        urgent = self._urgent if self.hurried else None
+        if sensed or (urgent is not None and urgent.stopped(palm, palm_velocity, elapsed=self._clock)):
             self._touched = palm.copy()
             self._level, self._unloaded_clock = 0.0, 0.0
             self._enter(ContactPhase.SENSED)
@@ -259,35 +251,6 @@ class HandContact:
             return "failed"
         self._descent = min(depth, self._descent + self._pace.touch_speed * dt)
         return None
-
-    def _stopped(self, palm: Vector, palm_velocity: Vector) -> bool:
-        """Whether something has stopped a palm that was to meet the surface in motion: a bounce between two plans."""
-        assert self.patch is not None
-        height = float((palm - self.patch.position) @ self.patch.normal) - self._radius
-        late = self._clock > 0.5 * self._duration
-        return late and height < STOPPED_HEIGHT and float(palm_velocity @ self.patch.normal) > -STOPPED_SPEED
-
-    def _aim(self, palm: Vector, palm_velocity: Vector) -> None:
-        """Aim an urgent approach anew from where the palm is; near the surface only its speed is still corrected."""
-        assert self.patch is not None
-        normal = self.patch.normal
-        arrival = -self._pace.touch_speed * normal
-        left = self._duration - self._clock
-        beyond = max(LAST_AIM - left, 0.0)  # [s] past the end of its way it goes on at its landing speed
-        end = self.patch.position + (self._radius + STANDOFF) * normal + beyond * arrival
-        left = max(left, LAST_AIM)
-        self._landing = Landing(
-            start=palm.copy(), velocity=palm_velocity.copy(), end=end, arrival=arrival, duration=left, normal=normal
-        )
-
-    def _possible(self, acceleration: Vector) -> Vector:
-        """What an arm can give of a wanted acceleration (3,) [m/s²]: meeting the surface softly comes before where."""
-        assert self.patch is not None
-        normal, most = self.patch.normal, self._settings.urgent_acceleration
-        along = float(acceleration @ normal)
-        across = acceleration - along * normal
-        across *= min(1.0, most / max(float(np.linalg.norm(across)), 1e-9))
-        return across + min(max(along, -1.5 * most), 1.5 * most) * normal
 
     def _descend_again(self, palm: Vector) -> None:
         assert self.patch is not None
