@@ -29,6 +29,13 @@ ONE_PUSH = "disturbances=[{kind: impulse, body: torso, time: 0.5, duration: 0.1,
 SHORT = "duration=6"
 ANY_PUSH = "checks.0.min_impulse=0.01"  # the scenario asks for a push of a certain strength
 
+# walk, one command or one push at a time.
+ONE_COMMAND = "tasks.0.commands=[{time: 0.5, velocity: [%s], yaw_rate: %s}, {time: 5.0, velocity: [0.0, 0.0]}]"
+UPRIGHT = ("duration=7.5", "checks=[{kind: upright_at_end}]", "counterfactuals={}", "sweep=null")
+ONLY_WALK = (*UPRIGHT, "disturbances=[]")
+WALK_PUSH = (*UPRIGHT, ONE_COMMAND % ("0.1, 0.0", "0.0"))
+PUSHED = "disturbances=[{kind: impulse, body: torso, time: 2.6, duration: 0.1, impulse: [%s]}]"
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -58,6 +65,12 @@ LIMITS = {
     "table_high": Limit("reach", "world.objects.table.size.2=%s", "m", 0.20, 0.04, 0.01),
     "mass_light": Limit("reach", "plant.mass_scale=%s", "1", 1.0, -0.1, 0.05),
     "mass_heavy": Limit("reach", "plant.mass_scale=%s", "1", 1.0, 0.1, 0.05),
+    "walk_forward": Limit("walk", ONE_COMMAND % ("%s, 0.0", "0.0"), "m/s", 0.22, 0.02, 0.02, ONLY_WALK),
+    "walk_backward": Limit("walk", ONE_COMMAND % ("%s, 0.0", "0.0"), "m/s", -0.18, -0.02, 0.02, ONLY_WALK),
+    "walk_left": Limit("walk", ONE_COMMAND % ("0.0, %s", "0.0"), "m/s", 0.04, 0.01, 0.01, ONLY_WALK),
+    "walk_turn": Limit("walk", ONE_COMMAND % ("0.0, 0.0", "%s"), "rad/s", 0.3, 0.2, 0.1, ONLY_WALK),
+    "walk_push_forward": Limit("walk", PUSHED % "%s, 0.0, 0.0", "N·s", 1.5, 0.2, 0.1, WALK_PUSH),
+    "walk_push_left": Limit("walk", PUSHED % "0.0, %s, 0.0", "N·s", 0.5, 0.2, 0.1, WALK_PUSH),
     "friction_low": Limit("reach", "plant.friction=%s", "1", 0.8, -0.2, 0.05),
 }
 
