@@ -81,7 +81,7 @@ class IdealGait:
             loads[side] = WEIGHT if touch else 0.0
             soles[side, :2] += self.error
         before = len(self.events)
-        gait.advance(self.time, DT, rate=rate, soles=soles, yaws=yaws, loads=loads, events=self.events)
+        gait.advance(self.time, DT, rate=rate, soles=soles, yaws=yaws, loads=loads, carried=True, events=self.events)
         if any("landed" in event for event in self.events[before:]):
             self.error = np.zeros(2)
 

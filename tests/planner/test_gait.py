@@ -347,6 +347,14 @@ def test_a_full_turn_keeps_its_heading() -> None:
         loads, swing = np.full(2, 30.0), gait.swing
         if swing is not None and swing.sigma < 0.98:
             loads[swing.step.side] = 0.0
-        gait.advance(run.time, DT, rate=1.0, soles=now.positions, yaws=measured, loads=loads, events=run.events)
+        gait.advance(
+            *(run.time, DT),
+            rate=1.0,
+            soles=now.positions,
+            yaws=measured,
+            loads=loads,
+            carried=True,
+            events=run.events,
+        )
         assert abs(gait.feet.yaws[0] - gait.feet.yaws[1]) < 1.0
     assert gait.feet.yaws.mean() > np.pi + 1.0

@@ -21,7 +21,7 @@ ELBOW_TOLERANCE = 0.015  # [m] of its posture's elbow under the clearance: the f
 COM_TOLERANCE = 0.004  # [m] how far outside the ZMP bounds a candidate's posture may have its CoM
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Candidate:
     """One hand on one patch."""
 
@@ -60,11 +60,21 @@ class Candidates:
         self._given = ContactChoice(most, settings, mass=robot.mass, backend="daqp") if slots else None
         self._slots = slots
 
-    def refresh(self, *, soles: Vector, yaws: Vector, centre: Vector, iterations: int, everyone: bool = False) -> None:
-        """Improve the posture of the next candidate in turn, or of all, for feet at `soles` (2, 3), `yaws` (2,)."""
+    def refresh(
+        self,
+        *,
+        soles: Vector,
+        yaws: Vector,
+        centre: Vector,
+        iterations: int,
+        used: list[Candidate],
+        everyone: bool = False,
+    ) -> None:
+        """Improve the postures of those `used` and of the next in turn, or of all, for feet at `soles`, `yaws`."""
         if not self.all:
             return
-        turn = self.all if everyone else [self.all[self._turn % len(self.all)]]
+        following = self.all[self._turn % len(self.all)]
+        turn = self.all if everyone else [*used, *([] if following in used else [following])]
         self._turn += 1
         heading = float(np.mean(yaws))
         self._left = np.array([-np.sin(heading), np.cos(heading)])

@@ -6,7 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.planner.candidates import Candidates
+from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
@@ -84,12 +84,16 @@ class Contacts:
     @property
     def posture(self) -> Posture | None:
         """The posture that has every hand with a contact on its patch and the CoM over the feet; None without one."""
-        placed = [c for c in self.hands if c.goal is not None]
-        if len(placed) == 1:
-            return next(
-                c for c in self.candidates.all if c.patch is placed[0].patch and c.hand == placed[0].side
-            ).posture
-        return self._together if placed else None
+        used = self._used
+        if len(used) == 1:
+            return used[0].posture
+        return self._together if used else None
+
+    @property
+    def _used(self) -> list[Candidate]:
+        """The candidates that the hands have taken, those being given up left out."""
+        taken = {(id(c.patch), c.side) for c in self.hands if c.goal is not None}
+        return [c for c in self.candidates.all if (id(c.patch), c.hand) in taken]
 
     # ------------------------------------------------------------------ one plan
 
@@ -102,7 +106,9 @@ class Contacts:
             soles, yaws: of the feet, (2, 3) [m] and (2,) [rad].
             centre: (2,) where the CoM should rather be [m].
         """
-        self.candidates.refresh(soles=soles, yaws=yaws, centre=centre, iterations=iterations, everyone=everyone)
+        self.candidates.refresh(
+            soles=soles, yaws=yaws, centre=centre, iterations=iterations, used=self._used, everyone=everyone
+        )
         palms = [c.target for c in self.hands]
         if all(palm is not None for palm in palms):
             self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)

@@ -88,13 +88,23 @@ class Gait:
     # ------------------------------------------------------------------ one plan later
 
     def advance(
-        self, time: float, dt: float, *, rate: float, soles: Vector, yaws: Vector, loads: Vector, events: list[str]
+        self,
+        time: float,
+        dt: float,
+        *,
+        rate: float,
+        soles: Vector,
+        yaws: Vector,
+        loads: Vector,
+        carried: bool,
+        events: list[str],
     ) -> None:
         """Move the clock on by dt [s] at `rate` (0 … 1: the gate).
 
         Args:
             soles, yaws: measured (2, 3) [m], (2,) [rad]: a foot stands where it has landed.
             loads: (2,) measured vertical forces [N].
+            carried: whether the feet's pressure is where the foot that stays can carry it alone: a stride waits for it.
         """
         settings = self._settings
         if self.phase != SupportPhase.SINGLE:
@@ -106,8 +116,8 @@ class Gait:
                 self.phase = SupportPhase.DOUBLE
                 self._left = max(settings.first_double_support, wanted.double_support)
             self.step = wanted
-            self._left -= rate * dt
-            if self._left <= 1e-9:
+            self._left = max(0.0, self._left - rate * dt)
+            if self._left <= 1e-9 and (carried or wanted.adaptable):
                 self._lift(wanted, events)
             return
         assert self.swing is not None

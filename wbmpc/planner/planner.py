@@ -33,6 +33,7 @@ from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import SIDES, CandidateReport, PlanReport, RobotState, StageReport, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
+LIFT_INSET = 0.005  # [m] of the pressure inside the foot that stays when a stride's foot lifts
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
 STRIDE_ITERATIONS = 50  # when a stride is asked for: half-finished postures would call for contacts
 
@@ -219,6 +220,7 @@ class Planner:
         go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
         self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
         self._gait.aim(self._footstep_shift[0], dt)
+        stance = self._gait.goal_polygon(half_extents=self._robot.sole_half_extents, margin=LIFT_INSET)
         self._gait.advance(
             state.time,
             dt,
@@ -226,6 +228,7 @@ class Planner:
             soles=self._measured.soles,
             yaws=self._measured.sole_yaws,
             loads=state.sole_wrench_in_world[:, 2],
+            carried=stance.excess(self._measured.feet_zmp) <= 0.0,
             events=events,
         )
         references.advance(

@@ -18,12 +18,17 @@ class Snapshot:
         self._robot, self._kinematics = robot, Kinematics(robot)
         self._kinematics.update(q, np.zeros(robot.nv))
         self._read()
+        self.feet_zmp = self.com[:2].copy()  # (2,) [m] centre of both soles' pressure
         self._homes = (self.palms - self._torso_position) @ self._torso_rotation  # in the torso
 
     def update(self, state: RobotState) -> None:
         """Take in a new state."""
         self._kinematics.update(state.q, state.v)
         self._read()
+        force, moment = state.sole_wrench_in_world[:, :3], state.sole_wrench_in_world[:, 3:]
+        load = max(float(force[:, 2].sum()), 1e-6)
+        levers = np.column_stack([-moment[:, 1], moment[:, 0]])
+        self.feet_zmp = (force[:, 2] @ self.soles[:, :2] + levers.sum(axis=0)) / load
 
     @property
     def palm_homes(self) -> Vector:
