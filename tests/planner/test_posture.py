@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from robots import at, palms, soles, surena
 
-from wbmpc.planner.posture import JOINT_MARGIN, Posture
+from wbmpc.planner.posture import ELBOW_CLEARANCE, JOINT_MARGIN, PalmTarget, Posture
 from wbmpc.rotations import level_frame
 from wbmpc.signals import Vector
 
@@ -20,9 +20,10 @@ SOLES, YAWS, CENTRE = soles(HOME), np.zeros(2), np.zeros(2)
 LOWER, UPPER = ROBOT.joint_lower + JOINT_MARGIN, ROBOT.joint_upper - JOINT_MARGIN
 
 
-def reached(targets: list[Vector | None], iterations: int = 60) -> Posture:
+def reached(targets: list[Vector | None], iterations: int = 60, normal: Vector | None = None) -> Posture:
     posture = Posture(ROBOT, nominal=HOME, com_cost=COM_COST)
-    posture.iterate(iterations, soles=SOLES, yaws=YAWS, palms=targets, centre=CENTRE)
+    wanted = [None if target is None else PalmTarget(target, normal) for target in targets]
+    posture.iterate(iterations, soles=SOLES, yaws=YAWS, palms=wanted, centre=CENTRE)
     return posture
 
 
@@ -105,3 +106,17 @@ def test_mirrored_targets_give_mirrored_postures() -> None:
     right = reached([None, np.array([0.40, -0.06, 0.28])])
     assert_allclose(left.com * [1, -1, 1], right.com, atol=1e-5)
     assert left.residual == pytest.approx(right.residual, abs=1e-6)
+
+
+@settings(max_examples=8, deadline=None)
+@given(x=st.floats(-0.05, 0.12), y=st.floats(0.18, 0.24), z=st.floats(0.20, 0.26))
+def test_an_elbow_stays_above_the_surface_its_palm_rests_on(x: float, y: float, z: float) -> None:
+    """On a ledge beside the body the nearest posture has the elbow beside the palm, or under it: through the ledge."""
+    target = np.array([x, y, z])
+    posture = reached([target, None], iterations=100, normal=np.array([0.0, 0.0, 1.0]))
+    kinematics = at(posture.q)
+    elbow, palm = (kinematics.position(f) for f in (ROBOT.elbow_frames[0], ROBOT.palm_frames[0]))
+    short = ELBOW_CLEARANCE - (elbow - palm)[2]
+    assert posture.elbow_excess == pytest.approx(max(short, 0.0), abs=1e-4)
+    assert short < 0.01
+    assert_allclose(palm, target, atol=4e-3)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from time import perf_counter
+
 import numpy as np
 
 from wbmpc.planner.footstep import SoleReferences
 from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.plan import Plan
-from wbmpc.signals import SIDES, HandMode, PlanReport, Vector
+from wbmpc.qp import QpSolution
+from wbmpc.signals import SIDES, HandMode, PlanReport, StageReport, Vector
 
 
 def assemble(
@@ -75,3 +78,8 @@ def assemble(
         arm_keep_out=arm_keep_out,
         report=report,
     )
+
+
+def stage_report(solution: QpSolution, start: float) -> StageReport:
+    """The report of a stage that began at perf_counter() = `start` [s] and ends now."""
+    return StageReport(solution.status, perf_counter() - start, solution.iterations)

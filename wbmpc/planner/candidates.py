@@ -84,7 +84,7 @@ class Candidates:
             candidate.posture.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     def reach_slack(self, candidate: Candidate, polygon: SupportPolygon) -> float:
-        """Reach margin [m]: negative when the palm falls short, its elbow is too low, or the CoM must leave its bounds."""
+        """Reach margin [m]: negative when palm or elbow fall short, or the CoM would have to leave the ZMP's bounds."""
         palm = self._settings.reach_margin - candidate.posture.residual
         elbow = ELBOW_TOLERANCE - candidate.posture.elbow_excess
         com = COM_TOLERANCE - polygon.excess(candidate.posture.com)

@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from wbmpc.planner.assembly import assemble
+from wbmpc.planner.assembly import assemble, stage_report
 from wbmpc.planner.bands import height_band
 from wbmpc.planner.com_height import ComHeightStage
 from wbmpc.planner.com_state import ComState
@@ -30,7 +30,7 @@ from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.scenario import Obstacle, PatchPose, Task
-from wbmpc.signals import SIDES, CandidateReport, PlanReport, RobotState, StageReport, Vector
+from wbmpc.signals import SIDES, CandidateReport, PlanReport, RobotState, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 LIFT_INSET = 0.005  # [m] of the pressure inside the foot that stays when a stride's foot lifts
@@ -104,7 +104,7 @@ class Planner:
         band = height_band(settings.height, gated, plane)
         wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)) - self._gait.crouch
         height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
-        stage1 = _stage_report(solution, begin)
+        stage1 = stage_report(solution, begin)
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._measured.palms)
@@ -156,7 +156,7 @@ class Planner:
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
         com_band = references.com_band(contacts, gated, sigma, gated_foot)
         motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
-        stage2 = _stage_report(solution, begin)
+        stage2 = stage_report(solution, begin)
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
 
@@ -297,7 +297,3 @@ class Planner:
 
         judged = preview(1.0, settings.zmp_margin)
         return judged, judged if self._gate >= 1.0 and not alarm else preview(self._gate, margin)
-
-
-def _stage_report(solution: QpSolution, start: float) -> StageReport:
-    return StageReport(solution.status, perf_counter() - start, solution.iterations)

@@ -30,8 +30,8 @@ class PalmTarget:
 
 
 class Posture:
-    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 3e2 Σ(elbow too low)² + w |c_xy − centre|²
-    + 3 (c_z − nominal)² + 2e-3 |posture error|².
+    """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 3e2 Σ(elbow too low)²
+    + w |c_xy − centre|² + 3 (c_z − nominal)² + 2e-3 |posture error|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
     the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
@@ -70,7 +70,9 @@ class Posture:
         """Yaw of the torso at the last iterate [rad]."""
         return heading_of(self._kinematics.rotation(self._robot.torso_frame))
 
-    def iterate(self, count: int, *, soles: Vector, yaws: Vector, palms: list[PalmTarget | None], centre: Vector) -> None:
+    def iterate(
+        self, count: int, *, soles: Vector, yaws: Vector, palms: list[PalmTarget | None], centre: Vector
+    ) -> None:
         """Run `count` iterations.
 
         Args:
@@ -83,7 +85,12 @@ class Posture:
         reached = tuple(p is not None for p in palms)
         if reached != self._reached:  # other hands: from the start, a neighbouring optimum can be a contorted one
             self.q, self._reached = self._nominal.copy(), reached
-        targets = (soles.tobytes(), yaws.tobytes(), centre.tobytes(), *(p.position.tobytes() for p in palms if p is not None))
+        targets = (
+            soles.tobytes(),
+            yaws.tobytes(),
+            centre.tobytes(),
+            *(p.position.tobytes() for p in palms if p is not None),
+        )
         if targets != self._targets:
             self._targets, self._step, self._left = targets, np.inf, PATIENCE
         for _ in range(count):
@@ -94,8 +101,6 @@ class Posture:
             H = np.zeros((nv, nv))
             g = np.zeros(nv)
             self.residual = 0.0
-            self.elbow_excess = 0.0
-            self.palm_errors[:] = 0.0
             for side, frame in enumerate(robot.sole_frames):
                 level = level_frame(yaws[side])
                 J = kinematics.jacobian(frame)
@@ -108,26 +113,7 @@ class Posture:
                 self.residual = max(self.residual, float(np.linalg.norm(error[:3])))
                 H += SOLE_COST * (J.T @ J)
                 g += SOLE_COST * (J.T @ error)
-            for side, frame in enumerate(robot.palm_frames):
-                target = palms[side]
-                if target is None:
-                    continue
-                J = kinematics.jacobian(frame)[:3]
-                error = target.position - kinematics.position(frame)
-                self.palm_errors[side] = np.linalg.norm(error)
-                self.residual = max(self.residual, float(self.palm_errors[side]))
-                error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
-                H += PALM_COST * (J.T @ J)
-                g += PALM_COST * (J.T @ error)
-                if target.normal is not None:
-                    elbow = robot.elbow_frames[side]
-                    height = target.normal @ (kinematics.position(elbow) - kinematics.position(frame))
-                    excess = ELBOW_CLEARANCE - float(height)
-                    if excess > 0.0:
-                        self.elbow_excess = max(self.elbow_excess, excess)
-                        row = target.normal @ (kinematics.jacobian(elbow)[:3] - J)
-                        H += ELBOW_COST * np.outer(row, row)
-                        g += ELBOW_COST * excess * row
+            self._add_palms(palms, H, g)
             self.com = kinematics.com
             J = kinematics.com_jacobian[:2]
             H += self._com_cost * (J.T @ J)
@@ -153,3 +139,30 @@ class Posture:
             self.q = robot.integrate(self.q, delta)
             np.clip(self.q[7:], self._lower, self._upper, out=self.q[7:])
             self._step = float(np.abs(delta).max())
+
+    def _add_palms(self, palms: list[PalmTarget | None], H: Vector, g: Vector) -> None:
+        """Add the palms' and elbows' terms to the normal equations  H (nv, nv), g (nv,)."""
+        robot, kinematics = self._robot, self._kinematics
+        self.elbow_excess = 0.0
+        self.palm_errors[:] = 0.0
+        for side, frame in enumerate(robot.palm_frames):
+            target = palms[side]
+            if target is None:
+                continue
+            J = kinematics.jacobian(frame)[:3]
+            error = target.position - kinematics.position(frame)
+            self.palm_errors[side] = np.linalg.norm(error)
+            self.residual = max(self.residual, float(self.palm_errors[side]))
+            error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
+            H += PALM_COST * (J.T @ J)
+            g += PALM_COST * (J.T @ error)
+            if target.normal is None:
+                continue
+            elbow = robot.elbow_frames[side]
+            height = target.normal @ (kinematics.position(elbow) - kinematics.position(frame))
+            excess = ELBOW_CLEARANCE - float(height)
+            if excess > 0.0:
+                self.elbow_excess = max(self.elbow_excess, excess)
+                row = target.normal @ (kinematics.jacobian(elbow)[:3] - J)
+                H += ELBOW_COST * np.outer(row, row)
+                g += ELBOW_COST * excess * row
