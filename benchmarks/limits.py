@@ -71,6 +71,14 @@ LIMITS = {
     "walk_turn": Limit("walk", ONE_COMMAND % ("0.0, 0.0", "%s"), "rad/s", 0.3, 0.2, 0.1, ONLY_WALK),
     "walk_push_forward": Limit("walk", PUSHED % "%s, 0.0, 0.0", "N·s", 1.5, 0.2, 0.1, WALK_PUSH),
     "walk_push_left": Limit("walk", PUSHED % "0.0, %s, 0.0", "N·s", 0.5, 0.2, 0.1, WALK_PUSH),
+    "wide_step_width": Limit("wide_step", "tasks.0.target.1=%s", "m", 0.225, 0.01, 0.005),
+    "wide_step_wall": Limit("wide_step", "world.objects.wall.position.1=%s", "m", 0.33, 0.01, 0.005),
+    "wide_step_mass": Limit("wide_step", "plant.mass_scale=%s", "1", 1.0, 0.1, 0.05),
+    "hole_sill_depth": Limit("hole", "world.objects.sill.size.0=%s", "m", 0.09, 0.01, 0.005),
+    "hole_sill_height": Limit("hole", "world.objects.sill.size.2=%s", "m", 0.03, 0.01, 0.005),
+    "hole_mass": Limit("hole", "plant.mass_scale=%s", "1", 1.0, 0.1, 0.05),
+    "two_hands_lean": Limit("two_hands", "tasks.0.target.0=%s", "m", 0.12, 0.005, 0.005),
+    "two_hands_mass": Limit("two_hands", "plant.mass_scale=%s", "1", 1.0, 0.1, 0.05),
     "friction_low": Limit("reach", "plant.friction=%s", "1", 0.8, -0.2, 0.05),
 }
 
