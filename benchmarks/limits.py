@@ -58,6 +58,9 @@ LIMITS = {
     "push_forward": Limit("push_stand", ONE_PUSH % "%s, 0.0, 0.0", "N·s", 1.4, 0.1, 0.05, (SHORT,)),
     "push_backward": Limit("push_stand", ONE_PUSH % "%s, 0.0, 0.0", "N·s", -0.6, -0.2, 0.05, (SHORT, ANY_PUSH)),
     "push_left": Limit("push_stand", ONE_PUSH % "0.0, %s, 0.0", "N·s", 1.4, 0.1, 0.05, (SHORT,)),
+    "push_rail": Limit(
+        "push_wall", "disturbances.0.impulse=[0.0, %s, 0.0]", "N·s", 2.88, 0.1, 0.1, ("checks.0.min_impulse=0.01",)
+    ),
     "reach_x": Limit("reach", "tasks.0.target.0=%s", "m", 0.44, 0.02, 0.01),
     "reach_high": Limit("reach", "tasks.0.target.2=%s", "m", 0.30, 0.06, 0.02),
     "reach_low": Limit("reach", "tasks.0.target.2=%s", "m", 0.30, -0.05, 0.02),

@@ -324,6 +324,14 @@ class UrgentBench(Bench):
         super().__init__()
         self.urgency, self.palm_velocity, self.drift = 1.0, velocity.copy(), drift
 
+    def plan(self, acceleration: Vector, jerk: Vector) -> None:
+        """Take in a plan."""
+        self.acceleration = acceleration
+
+    def followed(self, seconds: float) -> Vector:
+        """Acceleration [m/s²] so long after the last plan."""
+        return self.acceleration
+
     def land(self) -> tuple[float, float]:
         """Time [s] and speed into the surface [m/s] of the touch."""
         self.step()  # the contact hears of the alarm
@@ -335,12 +343,27 @@ class UrgentBench(Bench):
                     DT, palm=self.palm, palm_velocity=self.palm_velocity, force=np.zeros(3), wanted_force=0.0,
                     needed=True, quiet=False, urgency=1.0, home=HOME,
                 )  # fmt: skip
-                acceleration = self.contact.reference()[2] + self.drift
-            self.palm_velocity = self.palm_velocity + fine * acceleration
+                self.plan(self.contact.reference()[2], self.contact.jerk)
+            self.palm_velocity = self.palm_velocity + fine * (self.followed(k % 10 * fine) + self.drift)
             self.palm = self.palm + fine * self.palm_velocity
             if (self.palm - PATCH.position) @ PATCH.normal < RADIUS:
                 return (k + 1) * fine, -float(self.palm_velocity @ PATCH.normal)
         raise AssertionError("never touched")
+
+
+class LateBench(UrgentBench):
+    """The same with plans that are one period old when they are first followed, continued with their jerk."""
+
+    def __init__(self, *, velocity: Vector, drift: Vector) -> None:
+        super().__init__(velocity=velocity, drift=drift)
+        self.plans = [(np.zeros(3), np.zeros(3))] * 2
+
+    def plan(self, acceleration: Vector, jerk: Vector) -> None:
+        self.plans = [self.plans[1], (acceleration, jerk)]
+
+    def followed(self, seconds: float) -> Vector:
+        acceleration, jerk = self.plans[0]
+        return acceleration + (DT + seconds) * jerk
 
 
 @given(
@@ -354,3 +377,26 @@ def test_an_urgent_palm_is_there_in_time_and_softly_wherever_the_body_carries_it
     time, speed = UrgentBench(velocity=velocity, drift=drift).land()
     assert time < 1.6 * np.sqrt(6.0 * way / SETTINGS.urgent_acceleration)
     assert 0.0 < speed < 3.0 * SETTINGS.urgent_touch_speed
+
+
+@given(
+    velocity=st.tuples(*[st.floats(-0.3, 0.3)] * 3).map(np.array),
+    drift=st.tuples(*[st.floats(-3, 3)] * 3).map(np.array),
+)
+def test_an_urgent_palm_lands_softly_though_every_plan_comes_late(velocity: Vector, drift: Vector) -> None:
+    """As in the loop a plan is followed from one period after its snapshot to the next one's turn."""
+    assert LateBench(velocity=velocity, drift=drift).land()[1] < 3.0 * SETTINGS.urgent_touch_speed
+
+
+def test_a_hurried_palm_that_is_there_early_is_not_called_back() -> None:
+    bench = UrgentBench(velocity=np.zeros(3), drift=np.zeros(3))
+    bench.step()
+    bench.contact.choose(PATCH, palm=HOME, palm_velocity=np.zeros(3))
+    above = PATCH.position + (RADIUS + 0.006) * PATCH.normal
+    for velocity in (-0.3, -0.2, 0.0):
+        bench.contact.advance(
+            DT, palm=above, palm_velocity=velocity * PATCH.normal, force=np.zeros(3), wanted_force=0.0,
+            needed=True, quiet=False, urgency=1.0, home=HOME,
+        )  # fmt: skip
+        place = bench.contact.preview(np.array([0.03]))[0]  # whatever its speed: on at its landing speed
+        assert (place - above) @ PATCH.normal == pytest.approx(-0.03 * SETTINGS.urgent_touch_speed)

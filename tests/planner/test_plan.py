@@ -47,6 +47,7 @@ def random_plan(seed: int) -> Plan:
         foot_acceleration=rng.uniform(-1, 1, (2, 3)),
         hand_velocity=rng.uniform(-0.3, 0.3, (2, 3)),
         hand_acceleration=rng.uniform(-2, 2, (2, 3)),
+        hand_jerk=rng.uniform(-2, 2, (2, 3)),
         hand_force_cap=np.array([4.0, 16.0]),
         hand_force_cap_rate=np.array([66.0, -66.0]),
         hand_force_cap_top=np.array([10.0, 20.0]),

@@ -39,12 +39,15 @@ def assemble(
         arm_keep_out: (2, 3, 4) half-spaces of the arms' points; those of a palm with a task are left out.
     """
     palm_position, palm_velocity = joints.palms(velocity)
-    palm_acceleration = np.zeros((len(SIDES), 3))
+    palm_acceleration, palm_jerk = np.zeros((len(SIDES), 3)), np.array([contact.jerk for contact in contacts])
     for contact in contacts:
         if contact.hurried:  # straight from its path: stage 2's joint reference would come too late
             side = contact.side
             palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
     caps = np.array([c.caps(np.array([0.0, period])) for c in contacts])  # now and one plan later
+    for side, contact in enumerate(contacts):
+        if contact.hurried and contact.patch is not None:  # it may meet its surface before the next plan
+            caps[side] = contact.patch.force_cap
     for side, mode in enumerate(modes):  # a palm on its way to a surface must come near it, one on it holds the arm too
         if mode != HandMode.FREE:
             careful = mode == HandMode.MOVE and not contacts[side].hurried
@@ -68,6 +71,7 @@ def assemble(
         hand_position=palm_position,
         hand_velocity=palm_velocity,
         hand_acceleration=palm_acceleration,
+        hand_jerk=palm_jerk,
         hand_urgency=np.array([float(c.hurried) for c in contacts]),
         hand_force=report.contact_force[:, 0],
         hand_force_cap=caps[:, 0],

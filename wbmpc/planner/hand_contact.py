@@ -98,7 +98,7 @@ class HandContact:
         assert self._path is not None
         assert self.patch is not None
         if self._urgent is not None and self.hurried:
-            return self._urgent.reference()
+            return self._urgent.reference()[:3]
         if self._descent >= 0.0:
             moving = self._descent < self._pace.clearance + self._settings.search_depth
             normal = self.patch.normal
@@ -109,6 +109,11 @@ class HandContact:
             )
         p, dp, ddp = self._path.at(self._sigma)
         return p, dp * self._rate, ddp * self._rate**2
+
+    @property
+    def jerk(self) -> Vector:
+        """With which that acceleration goes on (3,) [m/s³]: only a hurried palm's changes between two plans."""
+        return self._urgent.reference()[3] if self._urgent is not None and self.hurried else np.zeros(3)
 
     def preview(self, times: Vector) -> Vector:
         """Palm references (n, 3) [m] at `times` (n,) seconds from now, while there is a goal to reach or hold."""

@@ -38,6 +38,7 @@ class Plan:
     hand_position: Vector  # (2, 3) [m]
     hand_velocity: Vector  # (2, 3) [m/s]
     hand_acceleration: Vector  # (2, 3) [m/s²]
+    hand_jerk: Vector  # (2, 3) [m/s³]
     hand_urgency: Vector  # (2,) 0 … 1
     hand_force: Vector  # (2, 3) [N]
     hand_force_cap: Vector  # (2,) [N] at the snapshot
@@ -87,9 +88,12 @@ class Plan:
             foot_velocity=going * (self.foot_velocity + dt * self.foot_acceleration),
             foot_acceleration=going * self.foot_acceleration,
             hand_mode=self.hand_mode,
-            hand_position=self.hand_position + dt * self.hand_velocity + dt**2 / 2 * self.hand_acceleration,
-            hand_velocity=going * (self.hand_velocity + dt * self.hand_acceleration),
-            hand_acceleration=going * self.hand_acceleration,
+            hand_position=self.hand_position
+            + dt * self.hand_velocity
+            + dt**2 / 2 * self.hand_acceleration
+            + dt**3 / 6 * self.hand_jerk,
+            hand_velocity=going * (self.hand_velocity + dt * self.hand_acceleration + dt**2 / 2 * self.hand_jerk),
+            hand_acceleration=going * (self.hand_acceleration + dt * self.hand_jerk),
             hand_urgency=self.hand_urgency,
             hand_force=self.hand_force,
             hand_force_cap=np.minimum(

@@ -101,9 +101,9 @@ class ContactSettings(StrictModel):
     approach_speed: float = Field(0.18, gt=0, description="[m/s] mean speed of the hand towards the clearance point")
     touch_speed: float = Field(0.06, gt=0, description="[m/s] speed of the descent: bounds the impact")
     urgent_acceleration: float = Field(36.0, gt=0, description="[m/s²] of the hand when the robot is falling")
-    urgent_touch_speed: float = Field(0.15, gt=0, description="[m/s] speed at which that hand meets the surface")
+    urgent_touch_speed: float = Field(0.2, gt=0, description="[m/s] speed at which that hand meets the surface")
     urgent_time: float = Field(0.22, gt=0, description="[s] a hand that needs longer comes too late to stop a fall")
-    urgent_ramp_time: float = Field(0.04, gt=0, description="[s] ramp of the force cap after such a landing")
+    urgent_ramp_time: float = Field(0.02, gt=0, description="[s] ramp of the force cap after such a landing")
     search_depth: float = Field(0.03, gt=0, description="[m] how far below the patch a descent looks for it")
     force_cost: float = Field(1.0, gt=0, description="[cost] weight of (n·f)²/(m g)²")
     tangent_cost: float = Field(

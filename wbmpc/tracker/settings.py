@@ -37,7 +37,7 @@ class TrackerSettings(StrictModel):
     hand_damping: float = Field(21.0, ge=0, description="[1/s]")
     hand_weight: float = Field(5.0, gt=0)
     hand_acceleration_limit: float = Field(5.0, gt=0, description="[m/s²] clip: the CoM must dominate the hands")
-    urgent_hand_weight: float = Field(50.0, gt=0, description="hand_weight of a hand that must be in time")
+    urgent_hand_weight: float = Field(300.0, gt=0, description="hand_weight of a hand that must be in time")
     urgent_hand_acceleration_limit: float = Field(25.0, gt=0, description="[m/s²] its clip")
     hand_integral: float = Field(60.0, ge=0, description="[1/s³] removes the steady error of a hand")
     hand_integral_limit: float = Field(3.0, ge=0, description="[m/s²] bound on the integral's share")

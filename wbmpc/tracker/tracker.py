@@ -22,6 +22,7 @@ from wbmpc.tracker.constraints import (
     pressure_rows,
     sole_wrench_rows,
 )
+from wbmpc.tracker.reflex import TouchReflex
 from wbmpc.tracker.settings import TrackerSettings
 from wbmpc.tracker.tasks import CONTACT, TaskStack
 
@@ -63,6 +64,7 @@ class Tracker:
         comfort_rows = slice(self._palm_rows.stop, self._palm_rows.stop + 2 * PRESSURE_ROWS)
         self._clearance_rows = slice(comfort_rows.stop, comfort_rows.stop + CLEARANCE_ROWS)
         self._clearance = Clearance(robot, settings)
+        self._reflex = TouchReflex()
         rows = self._clearance_rows.stop
         soft = np.zeros(rows)
         soft[self._clearance_rows] = settings.clearance_weight
@@ -101,6 +103,7 @@ class Tracker:
         start = perf_counter()
         kinematics, nj = self._kinematics, self._robot.nj
         kinematics.update(state.q, state.v)
+        setpoint = self._reflex.apply(setpoint, state.palm_force_in_world)
         self._tasks.build(kinematics, state.v, setpoint)
         self._clearance.build(kinematics, state.v, setpoint)
         self._contacts(kinematics, setpoint, state.palm_force_in_world)
