@@ -141,7 +141,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         hand_normal=np.tile([0.0, 0, 1], (2, 1)),
         hand_urgency=np.zeros(2),
         hand_friction=np.full(2, 0.5),
-        arm_keep_out=np.tile([0.0, 0.0, 0.0, -np.inf], (2, 3, 1)),
+        arm_keep_out=np.tile([0.0, 0.0, 0.0, -np.inf, 0.0], (2, 3, 1)),
     )
     command = TorqueCommand(
         torque=truth.torque,

@@ -40,7 +40,7 @@ def random_signal(cls: type, rng: np.random.Generator, **given_fields: object) -
             foot_position=(2, 3), foot_yaw=2, foot_yaw_rate=2, foot_velocity=(2, 3),
             foot_acceleration=(2, 3), hand_position=(2, 3),
             hand_velocity=(2, 3), hand_acceleration=(2, 3), hand_force=(2, 3), hand_force_cap=2, hand_normal=(2, 3),
-            hand_friction=2, arm_keep_out=(2, 3, 4), hand_urgency=2, time=None,
+            hand_friction=2, arm_keep_out=(2, 3, 5), hand_urgency=2, time=None,
         ),
         TorqueCommand: dict(
             torque=size.nj, acceleration=size.nv, sole_wrench_in_world=(2, 6), palm_force_in_world=(2, 3),

@@ -97,7 +97,7 @@ _SETPOINT: _Layout = {
     "hand_force_cap": ((2,), float),
     "hand_normal": ((2, 3), float),
     "hand_friction": ((2,), float),
-    "arm_keep_out": ((2, 3, 4), float),
+    "arm_keep_out": ((2, 3, 5), float),
 }
 _COMMAND: _Layout = {
     "torque": (("j",), float),

@@ -46,6 +46,7 @@ class Robot:
     palm_frames: tuple[int, int]  # centre of the palm sphere
     shoulder_frames: tuple[int, int]  # the first joint after the torso on the way to the palm
     elbow_frames: tuple[int, int]  # the last joint before the palm
+    leg_frames: tuple[tuple[int, int, int], tuple[int, int, int]]  # hip, knee and ankle: ends of thigh and shank
     torso_frame: int
     imu_frame: int
     leg_joints: tuple[NDArray[np.int64], NDArray[np.int64]]  # joint indices that move each sole, from the base out
@@ -89,6 +90,7 @@ class Robot:
             palm_frames=palm_frames,
             shoulder_frames=(_joint_frame(pin_model, arms[0][0]), _joint_frame(pin_model, arms[1][0])),
             elbow_frames=(_joint_frame(pin_model, arms[0][-1]), _joint_frame(pin_model, arms[1][-1])),
+            leg_frames=(_leg_frames(pin_model, legs[0]), _leg_frames(pin_model, legs[1])),
             torso_frame=torso_frame,
             imu_frame=pin_model.getFrameId("imu"),
             leg_joints=(_joint_indices(legs[0]), _joint_indices(legs[1])),
@@ -177,6 +179,11 @@ def _frozen(values: Vector) -> Vector:
 def _frames(model: pin.Model, site: str) -> tuple[int, int]:
     left, right = (model.getFrameId(f"{side}_{site}") for side in SIDES)
     return left, right
+
+
+def _leg_frames(model: pin.Model, leg: list[int]) -> tuple[int, int, int]:
+    """Frames of the last hip joint, the knee and the last ankle joint of a leg with three hip and two ankle joints."""
+    return _joint_frame(model, leg[2]), _joint_frame(model, leg[-3]), _joint_frame(model, leg[-1])
 
 
 def _joint_frame(model: pin.Model, joint: int) -> int:

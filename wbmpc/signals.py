@@ -106,7 +106,7 @@ class Setpoint:
     hand_force_cap: Vector  # (2,) [N] bound on the normal force, ramped: contact transitions without jumps
     hand_normal: Vector  # (2, 3) contact normal, out of the surface
     hand_friction: Vector  # (2,) planned friction coefficient
-    arm_keep_out: Vector  # (2, 3, 4) half-spaces a·x ≥ b of palm, forearm's middle and elbow; b = -inf: none
+    arm_keep_out: Vector  # (2, 3, 5) half-spaces a·x ≥ b of palm, a point between and elbow; a, b (-inf: none), share
 
 
 @dataclass(frozen=True, slots=True)

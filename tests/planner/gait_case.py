@@ -64,7 +64,8 @@ class IdealGait:
     @classmethod
     def of(cls, *tasks: Task, settings: GaitSettings = SETTINGS, feet: Feet | None = None) -> IdealGait:
         feet = feet or feet_at()
-        return cls(Gait(settings, stepping(*tasks, settings=settings), soles=feet.positions, yaws=feet.yaws))
+        steps = stepping(*tasks, settings=settings)
+        return cls(Gait(settings, steps, soles=feet.positions, yaws=feet.yaws, half_extents=HALF))
 
     def tick(self, *, rate: float = 1.0, touch: bool | None = None) -> None:
         """One plan later; `touch` says whether the swing foot feels the ground, by default when its time is up."""
@@ -96,4 +97,4 @@ class IdealGait:
         return SupportPolygon.of_corners(np.vstack(corners), margin=margin, plane_height=0.0)
 
     def preview(self, times: Vector, *, rate: float = 1.0, margin: float = 0.0, growth: float = 0.0) -> SupportPreview:
-        return self.gait.preview(self.time, times, rate=rate, margin=margin, growth=growth, half_extents=HALF)
+        return self.gait.preview(self.time, times, rate=rate, margin=margin, growth=growth)

@@ -6,9 +6,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wbmpc.planner.keep_out import DISTANCE, NEAR, KeepOut
+from wbmpc.planner.keep_out import DISTANCE, LEG_RADIUS, NEAR, KeepOut
 from wbmpc.scenario import Obstacle
 
+NO_LEGS = np.array([[[5.0, 0.0, 0.0], [5.0, 0.0, 1.0]]] * 4)
 number = st.floats(-0.3, 0.3)
 
 
@@ -34,7 +35,7 @@ def test_the_half_space_of_a_point_outside_touches_the_nearest_point_of_the_box(
     x = np.array(point)
     points = surface_points(obstacle)
     distances = np.linalg.norm(points - x, axis=1)
-    row = KeepOut((obstacle,)).half_spaces(x[None])[0]
+    row = KeepOut((obstacle,)).half_spaces(x[None])[0][0]
     if distances.min() > NEAR + 0.01:
         assert row[3] == -np.inf
     elif 0.01 < distances.min() < NEAR - 0.01:
@@ -44,13 +45,23 @@ def test_the_half_space_of_a_point_outside_touches_the_nearest_point_of_the_box(
 
 
 def test_a_point_inside_is_shown_the_shortest_way_out() -> None:
-    row = KeepOut((box((0.0, 0.0, 0.0), (0.1, 0.2, 0.3), 0.0),)).half_spaces(np.array([[-0.09, 0.05, 0.1]]))[0]
+    row = KeepOut((box((0.0, 0.0, 0.0), (0.1, 0.2, 0.3), 0.0),)).half_spaces(np.array([[-0.09, 0.05, 0.1]]))[0][0]
     assert np.allclose(row[:3], [-1.0, 0.0, 0.0])
     assert abs(row[3] - (0.1 + DISTANCE)) < 1e-12
 
 
 def test_the_nearest_of_several_obstacles_counts_and_none_gives_none() -> None:
     near, far = box((0.1, 0.0, 0.0), (0.05, 0.05, 0.05), 0.0), box((-0.15, 0.0, 0.0), (0.05, 0.05, 0.05), 0.0)
-    row = KeepOut((far, near)).half_spaces(np.zeros((1, 3)))[0]
+    row = KeepOut((far, near)).half_spaces(np.zeros((1, 3)))[0][0]
     assert np.allclose(row, [-1.0, 0.0, 0.0, -0.05 + DISTANCE])
-    assert KeepOut(()).half_spaces(np.zeros((2, 3)))[:, 3].tolist() == [-np.inf, -np.inf]
+    assert KeepOut(()).half_spaces(np.zeros((2, 3)))[0][:, 3].tolist() == [-np.inf, -np.inf]
+
+
+@given(angle=st.floats(-np.pi, np.pi), gap=st.floats(0.005, 0.05))
+def test_a_palm_beside_a_thigh_is_shown_away_from_its_axis(angle: float, gap: float) -> None:
+    legs = np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 0.2]]] * 4)
+    outward = np.array([np.cos(angle), np.sin(angle), 0.0])
+    palms = np.tile((LEG_RADIUS + gap) * outward + [0.0, 0.0, 0.1], (2, 1))
+    row = KeepOut(()).of_arms(palms, palms + 0.3 * outward, legs, free=[True, True])[0, 0]
+    assert np.allclose(row[:3], outward)
+    assert abs(row[:3] @ palms[0] - row[3] - (gap - DISTANCE)) < 1e-9

@@ -72,7 +72,7 @@ def standing(q: Vector = ROBOT.home_q, **changes: Any) -> Setpoint:
         hand_normal=np.tile([0.0, 0.0, 1.0], (2, 1)),
         hand_urgency=np.zeros(2),
         hand_friction=np.full(2, 0.5),
-        arm_keep_out=np.tile([0.0, 0.0, 0.0, -np.inf], (2, 3, 1)),
+        arm_keep_out=np.tile([0.0, 0.0, 0.0, -np.inf, 0.0], (2, 3, 1)),
     )
     return replace(stay, **changes)
 

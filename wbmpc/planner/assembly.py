@@ -36,7 +36,7 @@ def assemble(
         velocity: stage 2's joint velocities (nv,).
         stance: which feet stand.
         modes: of both hands.
-        arm_keep_out: (2, 3, 4) half-spaces of the arms' points; those of a palm with a task are left out.
+        arm_keep_out: (2, 3, 5) half-spaces of the arms' points; those of a palm with a task are left out.
     """
     palm_position, palm_velocity = joints.palms(velocity)
     palm_acceleration, palm_jerk = np.zeros((len(SIDES), 3)), np.array([contact.jerk for contact in contacts])

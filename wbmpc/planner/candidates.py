@@ -17,6 +17,7 @@ from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vector
 
 COM_COST = 4.0  # [cost / m²] how hard a candidate's posture keeps its CoM over the feet
+SEARCH_ITERATIONS = 12  # a plan, of a posture that is not settled
 ELBOW_TOLERANCE = 0.015  # [m] of its posture's elbow under the clearance: the forearm would meet the surface
 COM_TOLERANCE = 0.004  # [m] how far outside the ZMP bounds a candidate's posture may have its CoM
 
@@ -29,6 +30,12 @@ class Candidate:
     hand: int
     posture: Posture
     excluded: bool = False  # it was chosen before and the contact did not appear
+    current: bool = False  # its posture has been iterated for the feet as they stand
+
+    @property
+    def settled(self) -> bool:
+        """Whether its posture says if it is in reach."""
+        return self.current and self.posture.settled
 
     def goal(self, palm_radius: float) -> PalmTarget:
         """The palm when it rests on the patch."""
@@ -51,7 +58,8 @@ class Candidates:
             for patch in patches
             for hand in range(len(SIDES))
         ]
-        self._turn = 0
+        self._turn = -1
+        self._stand: tuple[bytes, ...] = ()  # where the feet were at the last refresh
         self._left = np.array([0.0, 1.0])  # unit, to the robot's left
         self._backend = backend
         slots = min(len(self.all), settings.most_candidates)
@@ -73,15 +81,33 @@ class Candidates:
         """Improve the postures of those `used` and of the next in turn, or of all, for feet at `soles`, `yaws`."""
         if not self.all:
             return
-        following = self.all[self._turn % len(self.all)]
-        turn = self.all if everyone else [*used, *([] if following in used else [following])]
-        self._turn += 1
+        stand = (soles.tobytes(), yaws.tobytes(), centre.tobytes())
+        if stand != self._stand:
+            self._stand = stand
+            for candidate in self.all:
+                candidate.current = False
+        turn = self.all if everyone else [*used, *(c for c in [self._following()] if c not in used)]
         heading = float(np.mean(yaws))
         self._left = np.array([-np.sin(heading), np.cos(heading)])
         for candidate in turn:
             palms: list[PalmTarget | None] = [None, None]
             palms[candidate.hand] = candidate.goal(self._robot.palm_radius)
-            candidate.posture.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
+            count = iterations if candidate.settled else max(iterations, SEARCH_ITERATIONS)
+            candidate.posture.iterate(count, soles=soles, yaws=yaws, palms=palms, centre=centre)
+            candidate.current = True
+
+    @property
+    def settled(self) -> bool:
+        """Whether all postures say if their candidate is in reach, from where the feet are."""
+        return all(candidate.settled for candidate in self.all)
+
+    def _following(self) -> Candidate:
+        """The next candidate whose posture is not settled yet, or just the next."""
+        for _ in self.all:
+            self._turn = (self._turn + 1) % len(self.all)
+            if not self.all[self._turn].settled:
+                break
+        return self.all[self._turn]
 
     def reach_slack(self, candidate: Candidate, polygon: SupportPolygon) -> float:
         """Reach margin [m]: negative when palm or elbow fall short, or the CoM would have to leave the ZMP's bounds."""

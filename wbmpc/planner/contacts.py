@@ -10,6 +10,7 @@ from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
+from wbmpc.planner.pace import hurried
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
@@ -19,7 +20,10 @@ from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, Sta
 
 RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
 TOGETHER_COST = 15.0  # [cost / m²] how hard the posture with both hands on their patches keeps its CoM over the feet
+SETTLE_TIME = 1.0  # [s] given to the candidates' postures, when the feet have moved, before one is chosen
+RESERVE = 0.012  # [m] of the feet's pressure inside its polygon that a contact should leave, if any does
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
+CARRYING = (ContactPhase.LOADED, ContactPhase.QUIET)
 NOT_RUN = StageReport(SolveStatus.NOT_RUN, 0.0, 0)
 
 
@@ -52,6 +56,7 @@ class Contacts:
         self._spent: tuple[int, ...] = ()  # sides of contacts out of reach of what comes next
         self._hopeless = 0.0  # [s] that no candidate has been able to help
         self._since_review = RETRY_PLANS
+        self._waited = 0.0  # [s] for the candidates' postures
         self._palm_velocities = np.zeros((len(SIDES), 3))  # [m/s] measured at the last plan
         self._urgency = 0.0  # 0 … 1, at the last plan
 
@@ -59,12 +64,18 @@ class Contacts:
 
     @property
     def gate_open(self) -> bool:
-        """Whether tasks may go on: no contact is needed, or all that are expected carry load, or none can help."""
+        """Whether tasks may go on: no contact is needed, or those there are do and carry load, or none can help."""
         if not self._needed or not self.candidates.all:
             return True
         awaited = any(c.busy and c.expected for c in self.hands)
-        carried = any(c.phase in (ContactPhase.LOADED, ContactPhase.QUIET) for c in self.hands)
-        return (carried or self._hopeless >= GIVE_UP_TIME) and not awaited
+        carried = any(c.phase in CARRYING for c in self.hands)
+        answered = carried and not self._short and self._known
+        return not awaited and (self._hopeless >= GIVE_UP_TIME or answered)
+
+    @property
+    def _known(self) -> bool:
+        """Whether the candidates' postures say what is in reach, or have had their time."""
+        return not 0.0 < self._waited <= SETTLE_TIME or hurried(self._urgency)
 
     @property
     def leaving(self) -> bool:
@@ -189,14 +200,17 @@ class Contacts:
         if not self._needed:
             self._hopeless, self._spare, self._short = 0.0, None, False
         elif self.candidates.all:
-            if self._since_review >= RETRY_PLANS and (any(free) or len(self._committed) > 1):
+            self._waited = 0.0 if self.candidates.settled else self._waited + self._period
+            if self._known and self._since_review >= RETRY_PLANS and (any(free) or len(self._committed) > 1):
                 self._since_review = 0
                 knots = self._worst_knots(need, goal)
                 self._review(knots)
                 if self._short and any(free) and self._hopeless < GIVE_UP_TIME:
                     reports, stage = self._fire(knots, palms=palms, free=free, polygon=polygon, events=events)
-            if not self._committed:
+            if not self._committed or self._short:
                 self._hopeless += self._period
+            elif self._hopeless < GIVE_UP_TIME:
+                self._hopeless = 0.0
         for contact in self.hands:
             contact.need(self._short and free[contact.side] and self._hopeless < GIVE_UP_TIME)
         force_stage = self._plan_forces(need)
@@ -229,7 +243,7 @@ class Contacts:
         held = _options(committed)
         self._short = not np.isfinite(self.candidates.carry(knots.inset(-threshold), held))
         before, self._spare = self._spare, None
-        if len(committed) > 1 and not self._short:
+        if len(committed) > 1 and not self._short and all(c.phase in CARRYING for c in committed):
             alone = {
                 c.side: self.candidates.carry(knots.inset(threshold), [o]) for c, o in zip(committed, held, strict=True)
             }
@@ -242,9 +256,12 @@ class Contacts:
     ) -> tuple[tuple[CandidateReport, ...], StageReport]:
         """Stage 3's choice of what joins the committed contacts."""
         held = _options(self._committed)
-        winners, reports, stage = self.candidates.choose(
-            knots, palms=palms, free_hands=free, held=held, polygon=polygon, urgency=self._urgency
-        )
+        for asked in (knots.inset(RESERVE), knots):
+            winners, reports, stage = self.candidates.choose(
+                asked, palms=palms, free_hands=free, held=held, polygon=polygon, urgency=self._urgency
+            )
+            if winners:
+                break
         chosen = " and ".join(f"{w.patch.name} for the {SIDES[w.hand]} hand" for w in winners)
         size = 1e3 * np.abs(knots.delta_z[0]).max()
         beside = f" beside {' and '.join(option.patch.name for option in held)}" if held else ""

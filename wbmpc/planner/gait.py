@@ -33,9 +33,11 @@ class SupportPhase(IntEnum):
 class Gait:
     """Support phases of the two feet, driven by a clock, touch-downs and the steps that the tasks ask for."""
 
-    def __init__(self, settings: GaitSettings, stepping: Stepping, *, soles: Vector, yaws: Vector) -> None:
-        """Standing with the soles at `soles` (2, 3) [m], `yaws` (2,) [rad]."""
-        self._settings, self._stepping = settings, stepping
+    def __init__(
+        self, settings: GaitSettings, stepping: Stepping, *, soles: Vector, yaws: Vector, half_extents: Vector
+    ) -> None:
+        """Standing with the soles, of `half_extents` (2,) [m], at `soles` (2, 3) [m], `yaws` (2,) [rad]."""
+        self._settings, self._stepping, self._half_extents = settings, stepping, half_extents
         self.feet = Feet(soles.copy(), yaws.copy(), -1)
         self.phase = SupportPhase.STAND
         self.step: Footstep | None = None
@@ -167,9 +169,7 @@ class Gait:
 
     # ------------------------------------------------------------------ over the horizon
 
-    def preview(
-        self, time: float, times: Vector, *, rate: float, margin: float, growth: float, half_extents: Vector
-    ) -> SupportPreview:
+    def preview(self, time: float, times: Vector, *, rate: float, margin: float, growth: float) -> SupportPreview:
         """Support over the horizon.
 
         Args:
@@ -177,8 +177,8 @@ class Gait:
             times: (N,) knots [s from now].
             rate: at which the present phase goes on (0 … 1).
             margin: inset of the polygons [m], growing by `growth` [m/s].
-            half_extents: (2,) of a sole [m].
         """
+        half_extents = self._half_extents
         intervals, steps = self._intervals(time, float(times[-1]), rate)
         n, m = len(times), MAX_FOOTSTEPS
         shift = np.zeros((n, m))
@@ -228,11 +228,18 @@ class Gait:
             com_velocity=com_velocity,
         )
 
-    def goal_polygon(self, *, half_extents: Vector, margin: float) -> SupportPolygon:
+    def goal_polygon(self, margin: float) -> SupportPolygon:
         """What carries the robot where its task ends: the stance foot when a foot is put somewhere, else both feet."""
-        stride = self.stride
-        swing = -1 if stride is None else stride.step.side
-        return Interval(NEVER, self.feet, swing, (-1, -1)).polygon(0.0, half_extents=half_extents, margin=margin)
+        return self._polygon_without(-1 if self.stride is None else self.stride.step.side, margin)
+
+    def present_polygon(self, margin: float) -> SupportPolygon:
+        """What carries the robot now."""
+        return self._polygon_without(-1 if self.swing is None else self.swing.step.side, margin)
+
+    def _polygon_without(self, swing: int, margin: float) -> SupportPolygon:
+        """Polygon of the feet but for the one at side `swing` (-1: of both), inset by `margin` [m]."""
+        interval = Interval(NEVER, self.feet, swing, (-1, -1))
+        return interval.polygon(0.0, half_extents=self._half_extents, margin=margin)
 
     def _intervals(self, time: float, horizon: float, rate: float) -> tuple[list[Interval], list[Footstep]]:
         """Phases until the horizon [s] and the footsteps made in them, at most MAX_FOOTSTEPS."""

@@ -1,4 +1,4 @@
-"""What free arms must not touch: half-spaces in front of the nearest obstacles."""
+"""What free arms must not touch: half-spaces in front of the nearest obstacle or leg."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from wbmpc.signals import Vector
 
 NEAR = 0.12  # [m] obstacles farther than this from a point are left alone
 DISTANCE = 0.025  # [m] kept between an obstacle and the axis of an arm
+LEG_RADIUS = 0.024  # [m] of the links of a leg
+SHARES = np.linspace(0.0, 1.0, 9)  # of the elbow in the points of a forearm that are looked at; the rest is the palm's
 
 
 class KeepOut:
@@ -23,16 +25,40 @@ class KeepOut:
         self._to_world[:, 0, 0] = self._to_world[:, 1, 1] = np.cos(yaws)
         self._to_world[:, 1, 0], self._to_world[:, 0, 1] = np.sin(yaws), -np.sin(yaws)
 
-    def half_spaces(self, points: Vector) -> Vector:
-        """Half-spaces (n, 4): a point x of row (a, b) should keep a·x ≥ b; b is -inf when no obstacle is near.
+    def of_arms(self, palms: Vector, elbows: Vector, leg_links: Vector, *, free: list[bool]) -> Vector:
+        """Half-spaces (2, 3, 5) of palm, elbow and the point between them that is nearest to anything: a, b, share.
+
+        `palms`, `elbows` (2, 3), `leg_links` (4, 2, 3): ends of thighs and shanks, in world [m]; share: of the elbow in
+        the point, 0 … 1. A bar fits between three fixed
+        points of a forearm; the nearest one it cannot pass. Of a hand that is not `free` only the elbow's half of the
+        forearm counts: the palm is to come near to something.
+        """
+        points = palms[:, None] + SHARES[None, :, None] * (elbows - palms)[:, None]
+        points = points.reshape(-1, 3)
+        rows, distances = self.half_spaces(points)
+        away, clearance = _from_links(points, leg_links)
+        nearer = clearance < np.minimum(distances, NEAR)
+        rows[nearer, :3] = away[nearer]
+        rows[nearer, 3] = (np.einsum("ni,ni->n", away, points) - clearance + DISTANCE)[nearer]
+        distances = np.minimum(distances, clearance)
+        rows, distances = rows.reshape(2, len(SHARES), 4), distances.reshape(2, len(SHARES))
+        arms = np.empty((2, 3, 5))
+        for side in range(2):
+            first = 1 if free[side] else len(SHARES) // 2
+            chosen = (0, first + int(np.argmin(distances[side, first:-1])), len(SHARES) - 1)
+            arms[side, :, :4], arms[side, :, 4] = rows[side, chosen], SHARES[list(chosen)]
+        return arms
+
+    def half_spaces(self, points: Vector) -> tuple[Vector, Vector]:
+        """Half-spaces (n, 4): a point x of row (a, b) should keep a·x ≥ b; and distances (n,) [m] to the obstacles.
 
         `points` (n, 3) in world [m]. Each row belongs to the obstacle nearest to its point; a is the direction away
-        from it, for a point inside it the way out through the nearest face.
+        from it, for a point inside it the way out through the nearest face. b is -inf when no obstacle is near.
         """
         rows = np.zeros((len(points), 4))
         rows[:, 3] = -np.inf
         if not len(self._centres):
-            return rows
+            return rows, np.full(len(points), np.inf)
         inside = np.einsum("nki,kij->nkj", points[:, None] - self._centres, self._to_world)  # in each box
         gaps = np.abs(inside) - self._halves
         away = np.maximum(gaps, 0.0)
@@ -46,4 +72,14 @@ class KeepOut:
             direction = self._to_world[k] @ (direction * np.where(inside[n, k] < 0.0, -1.0, 1.0))
             direction /= np.linalg.norm(direction)
             rows[n, :3], rows[n, 3] = direction, direction @ points[n] - distance + DISTANCE
-        return rows
+        return rows, distances.min(axis=1)
+
+
+def _from_links(points: Vector, links: Vector) -> tuple[Vector, Vector]:
+    """Unit directions (n, 3) away from the nearest of the links' capsules, and distances (n,) [m] to it."""
+    begin, along = links[:, 0], links[:, 1] - links[:, 0]
+    shares = np.einsum("nki,ki->nk", points[:, None] - begin, along) / np.einsum("ki,ki->k", along, along)
+    offsets = points[:, None] - begin - np.clip(shares, 0.0, 1.0)[:, :, None] * along
+    distances = np.sqrt(np.einsum("nki,nki->nk", offsets, offsets))
+    nearest = (np.arange(len(points)), np.argmin(distances, axis=1))
+    return offsets[nearest] / np.maximum(distances[nearest], 1e-9)[:, None], distances[nearest] - LEG_RADIUS

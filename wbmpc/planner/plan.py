@@ -46,7 +46,7 @@ class Plan:
     hand_force_cap_top: Vector  # (2,) [N]
     hand_normal: Vector  # (2, 3)
     hand_friction: Vector  # (2,)
-    arm_keep_out: Vector  # (2, 3, 4)
+    arm_keep_out: Vector  # (2, 3, 5)
     report: PlanReport
 
     def com_state(self, time: float) -> Vector:

@@ -30,7 +30,7 @@ from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.scenario import Obstacle, PatchPose, Task
-from wbmpc.signals import SIDES, CandidateReport, PlanReport, RobotState, Vector
+from wbmpc.signals import CandidateReport, HandMode, PlanReport, RobotState, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 LIFT_INSET = 0.005  # [m] of the pressure inside the foot that stays when a stride's foot lifts
@@ -70,7 +70,12 @@ class Planner:
         )
         measured = self._measured = Snapshot(robot, q)
         stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
-        self._gait = Gait(settings.gait, stepping, soles=measured.soles, yaws=measured.sole_yaws)
+        self._gait = Gait(
+            *(settings.gait, stepping),
+            soles=measured.soles,
+            yaws=measured.sole_yaws,
+            half_extents=robot.sole_half_extents,
+        )
         self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._com = ComState(settings, com=measured.com, period=period)
@@ -89,6 +94,7 @@ class Planner:
         start = perf_counter()
         events: list[str] = []
         settings, preview, contacts, references = self._settings, self._preview, self._contacts, self._references
+        measured = self._measured
         self._observe(state)
         self._advance(state, events)
         judged, gated_support = self._supports(state.time)
@@ -147,7 +153,7 @@ class Planner:
                     binding=stride is not None,
                     palms=self._measured.palms,
                     hand_taken=references.hands_taken(),
-                    polygon=judged.polygons[0],
+                    polygon=self._gait.present_polygon(settings.whole_body.zmp_margin),
                     spent=references.spent(contacts),
                     events=events,
                 )
@@ -183,7 +189,6 @@ class Planner:
         if motion is None and self._last is not None:
             self._last = replace(self._last, report=report)
             return self._last
-        arms = self._keep_out.half_spaces(self._measured.arm_points.reshape(-1, 3)).reshape(len(SIDES), -1, 4)
         self._last = assemble(
             report,
             step=preview.step,
@@ -195,7 +200,10 @@ class Planner:
             soles=soles,
             modes=[mode for _, _, mode in hands],
             contacts=contacts.hands,
-            arm_keep_out=arms,
+            arm_keep_out=self._keep_out.of_arms(
+                *(measured.palms, measured.elbows, measured.leg_links),
+                free=[mode == HandMode.FREE for _, _, mode in hands],
+            ),
         )
         return self._last
 
@@ -220,7 +228,7 @@ class Planner:
         go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
         self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
         self._gait.aim(self._footstep_shift[0], dt)
-        stance = self._gait.goal_polygon(half_extents=self._robot.sole_half_extents, margin=LIFT_INSET)
+        stance = self._gait.goal_polygon(LIFT_INSET)
         self._gait.advance(
             state.time,
             dt,
@@ -274,8 +282,7 @@ class Planner:
         com = self._references.goal_com
         if com is None:
             return None
-        margin = self._settings.whole_body.zmp_margin
-        polygon = self._gait.goal_polygon(half_extents=self._robot.sole_half_extents, margin=margin)
+        polygon = self._gait.goal_polygon(self._settings.whole_body.zmp_margin)
         return need_at_rest(com, polygon=polygon, mass=mass)
 
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
@@ -292,7 +299,6 @@ class Planner:
                 rate=rate,
                 margin=margin,
                 growth=settings.zmp_margin_growth,
-                half_extents=self._robot.sole_half_extents,
             )
 
         judged = preview(1.0, settings.zmp_margin)

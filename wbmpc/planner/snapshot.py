@@ -39,8 +39,11 @@ class Snapshot:
         kinematics, robot = self._kinematics, self._robot
         self.com, self.com_velocity = kinematics.com, kinematics.com_velocity  # (3,) [m], [m/s]
         self.palms = np.array([kinematics.position(f) for f in robot.palm_frames])  # (2, 3) [m]
-        elbows = np.array([kinematics.position(f) for f in robot.elbow_frames])
-        self.arm_points = np.stack([self.palms, 0.5 * (self.palms + elbows), elbows], axis=1)  # (2, 3, 3) [m]
+        self.elbows = np.array([kinematics.position(f) for f in robot.elbow_frames])  # (2, 3) [m]
+        joints = np.array([[kinematics.position(f) for f in leg] for leg in robot.leg_frames])  # (2, 3, 3)
+        self.leg_links = np.stack([joints[:, :-1], joints[:, 1:]], axis=2).reshape(
+            4, 2, 3
+        )  # [m] thighs, shanks
         self.palm_velocities = np.array([kinematics.velocity(f)[:3] for f in robot.palm_frames])  # (2, 3) [m/s]
         self.soles = np.array([kinematics.position(f) for f in robot.sole_frames])  # (2, 3) [m]
         self.sole_yaws = np.array([heading_of(kinematics.rotation(f)) for f in robot.sole_frames])  # (2,) [rad]

@@ -11,7 +11,7 @@ from wbmpc.signals import HandMode, Setpoint, Vector
 from wbmpc.tracker.settings import TrackerSettings
 
 SHARES = (0.0, 0.5, 1.0)  # of the elbow in an arm's points; the rest is the palm's
-POINTS = 3  # of each arm: palm, middle of the forearm, elbow
+POINTS = 3  # of each arm: palm, one of the forearm, elbow
 ROWS_PER_ARM = 2 * POINTS + 1
 CLEARANCE_ROWS = 2 * ROWS_PER_ARM
 NEAR = 0.10  # [m] a point farther than this from its bound is left alone
@@ -54,9 +54,9 @@ class Clearance:
                 jacobian -= outward @ trunk[:3] + cross(along, outward) @ trunk[3:]
                 drift -= float(outward @ kinematics.drift(torso)[:3])
                 self._barrier(ROWS_PER_ARM * side + i, jacobian, drift, gap, v)
-            for i, share in enumerate(SHARES):
-                plane = setpoint.arm_keep_out[side, i]
+            for i, plane in enumerate(setpoint.arm_keep_out[side]):
                 if plane[3] > -np.inf:
+                    share = float(plane[4])
                     point = palm + share * (elbow - palm)
                     jacobian, drift = self._arm_point(kinematics, side, share, plane[:3])
                     gap = float(plane[:3] @ point) - plane[3]
