@@ -65,7 +65,7 @@ class IdealGait:
     def of(cls, *tasks: Task, settings: GaitSettings = SETTINGS, feet: Feet | None = None) -> IdealGait:
         feet = feet or feet_at()
         steps = stepping(*tasks, settings=settings)
-        return cls(Gait(settings, steps, soles=feet.positions, yaws=feet.yaws, half_extents=HALF))
+        return cls(Gait(settings, steps, feet=feet, half_extents=HALF))
 
     def tick(self, *, rate: float = 1.0, touch: bool | None = None) -> None:
         """One plan later; `touch` says whether the swing foot feels the ground, by default when its time is up."""

@@ -36,7 +36,7 @@ def assemble(
         velocity: stage 2's joint velocities (nv,).
         stance: which feet stand.
         modes: of both hands.
-        arm_keep_out: (2, 3, 5) half-spaces of the arms' points; those of a palm with a task are left out.
+        arm_keep_out: (2, 3, 5) half-spaces of the arms' points; a braced or hurried arm has none.
     """
     palm_position, palm_velocity = joints.palms(velocity)
     palm_acceleration, palm_jerk = np.zeros((len(SIDES), 3)), np.array([contact.jerk for contact in contacts])
@@ -48,10 +48,9 @@ def assemble(
     for side, contact in enumerate(contacts):
         if contact.hurried and contact.patch is not None:  # it may meet its surface before the next plan
             caps[side] = contact.patch.force_cap
-    for side, mode in enumerate(modes):  # a palm on its way to a surface must come near it, one on it holds the arm too
-        if mode != HandMode.FREE:
-            careful = mode == HandMode.MOVE and not contacts[side].hurried
-            arm_keep_out[side, : (1 if careful else None), 3] = -np.inf
+    for side, mode in enumerate(modes):  # a palm on its surface holds the arm, a hurried one has its way planned
+        if mode == HandMode.CONTACT or contacts[side].hurried:
+            arm_keep_out[side, :, 3] = -np.inf
     return Plan(
         time=report.time,
         step=step,

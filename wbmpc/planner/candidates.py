@@ -8,6 +8,7 @@ import numpy as np
 
 from wbmpc.planner.contact_choice import ContactChoice, Option
 from wbmpc.planner.contact_force import Need
+from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.pace import hurried, way_time
 from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.settings import ContactSettings
@@ -50,9 +51,16 @@ class Candidates:
     """
 
     def __init__(
-        self, robot: Robot, patches: tuple[PatchPose, ...], settings: ContactSettings, *, nominal: Vector, backend: str
+        self,
+        robot: Robot,
+        patches: tuple[PatchPose, ...],
+        settings: ContactSettings,
+        *,
+        keep_out: KeepOut,
+        nominal: Vector,
+        backend: str,
     ) -> None:
-        self._robot, self._settings = robot, settings
+        self._robot, self._settings, self._keep_out = robot, settings, keep_out
         self.all = [
             Candidate(patch, hand, Posture(robot, nominal=nominal, com_cost=COM_COST))
             for patch in patches
@@ -110,11 +118,12 @@ class Candidates:
         return self.all[self._turn]
 
     def reach_slack(self, candidate: Candidate, polygon: SupportPolygon) -> float:
-        """Reach margin [m]: negative when palm or elbow fall short, or the CoM would have to leave the ZMP's bounds."""
+        """Reach margin [m]: negative when the palm falls short, the forearm meets something or the CoM strays."""
         palm = self._settings.reach_margin - candidate.posture.residual
         elbow = ELBOW_TOLERANCE - candidate.posture.elbow_excess
+        gap = self._keep_out.forearm_gap(*candidate.posture.forearm(candidate.hand))
         com = COM_TOLERANCE - polygon.excess(candidate.posture.com)
-        return min(palm, elbow, com)
+        return min(palm, elbow, gap, com)
 
     def choose(
         self,
@@ -140,9 +149,8 @@ class Candidates:
         """
         if self._choice is None:
             return [], (), StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
-        distances, reasons = self._sort_out(
-            palms=palms, free_hands=free_hands, held=held, polygon=polygon, urgency=urgency
-        )
+        slacks = {id(c): self.reach_slack(c, polygon) for c in self.all}
+        distances, reasons = self._sort_out(slacks, palms=palms, free_hands=free_hands, held=held, urgency=urgency)
         considered = [c for c in self.all if id(c) not in reasons]
         considered.sort(key=lambda candidate: distances[id(candidate)])
         room = self._slots - len(held)
@@ -172,7 +180,7 @@ class Candidates:
                     hand=candidate.hand,
                     chosen=any(w is candidate for w in winners),
                     cost=cost,
-                    reach_slack=self.reach_slack(candidate, polygon),
+                    reach_slack=slacks[id(candidate)],
                     friction_margin=_friction_margin(candidate.patch, forces) if np.isfinite(cost) else float("nan"),
                     force=forces[0],
                     reason=reason,
@@ -188,18 +196,18 @@ class Candidates:
 
     def _sort_out(
         self,
+        slacks: dict[int, float],
         *,
         palms: Vector,
         free_hands: list[bool],
         held: list[Option],
-        polygon: SupportPolygon,
         urgency: float,
     ) -> tuple[dict[int, float], dict[int, str]]:
         """Way of the palm to each candidate [m], and why some are out of the question; both by id of the candidate."""
         distances: dict[int, float] = {}
         reasons: dict[int, str] = {}
         for candidate in self.all:
-            key, slack = id(candidate), self.reach_slack(candidate, polygon)
+            key, slack = id(candidate), slacks[id(candidate)]
             goal = candidate.goal(self._robot.palm_radius).position
             distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
             if any(option.patch is candidate.patch and option.hand == candidate.hand for option in held):

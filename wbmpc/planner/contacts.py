@@ -10,6 +10,7 @@ from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import ContactForce, Need
 from wbmpc.planner.hand_contact import HandContact
+from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.pace import hurried
 from wbmpc.planner.posture import Posture
 from wbmpc.planner.settings import PlannerSettings
@@ -36,6 +37,7 @@ class Contacts:
         settings: PlannerSettings,
         patches: tuple[PatchPose, ...],
         *,
+        keep_out: KeepOut,
         nominal: Vector,
         times: Vector,
         period: float,
@@ -44,7 +46,9 @@ class Contacts:
         contact = settings.contact
         self._settings, self._times, self._period = contact, times, period
         self.hands = [HandContact(side, contact, palm_radius=robot.palm_radius) for side in range(len(SIDES))]
-        self.candidates = Candidates(robot, patches, contact, nominal=nominal, backend=settings.miqp_backend)
+        self.candidates = Candidates(
+            robot, patches, contact, keep_out=keep_out, nominal=nominal, backend=settings.miqp_backend
+        )
         self._force_stage = ContactForce(
             len(times), contact, mass=robot.mass, contacts=len(SIDES), backend=settings.qp_backend
         )

@@ -33,12 +33,10 @@ class SupportPhase(IntEnum):
 class Gait:
     """Support phases of the two feet, driven by a clock, touch-downs and the steps that the tasks ask for."""
 
-    def __init__(
-        self, settings: GaitSettings, stepping: Stepping, *, soles: Vector, yaws: Vector, half_extents: Vector
-    ) -> None:
-        """Standing with the soles, of `half_extents` (2,) [m], at `soles` (2, 3) [m], `yaws` (2,) [rad]."""
+    def __init__(self, settings: GaitSettings, stepping: Stepping, *, feet: Feet, half_extents: Vector) -> None:
+        """Standing on `feet`, whose soles have `half_extents` (2,) [m]."""
         self._settings, self._stepping, self._half_extents = settings, stepping, half_extents
-        self.feet = Feet(soles.copy(), yaws.copy(), -1)
+        self.feet = feet
         self.phase = SupportPhase.STAND
         self.step: Footstep | None = None
         self.swing: Swing | None = None
@@ -253,7 +251,7 @@ class Gait:
         step = self.step if self.swing is None else self.swing.step
         if self.swing is None:
             assert step is not None
-            transfer = _transfer(step, feet, end)
+            transfer = Transfer.before_step(step, feet, end)
             if transfer and feet.last < 0 and transfer.begin > 0.0:
                 intervals.append(Interval(transfer.begin, feet, -1, moved))
             intervals.append(Interval(end, feet, -1, moved, transfer))
@@ -268,7 +266,7 @@ class Gait:
                 break
             step = self._stepping.next(feet, time + end, made=made)
             end = end + step.double_support if step else NEVER
-            intervals.append(Interval(end, feet, -1, moved, _transfer(step, feet, end) if step else None))
+            intervals.append(Interval(end, feet, -1, moved, Transfer.before_step(step, feet, end) if step else None))
             if step is not None:
                 end += step.swing_time
         intervals.append(Interval(NEVER, feet, -1, moved))
@@ -300,12 +298,3 @@ class Gait:
             offset = self.swing.target[:2] - self.swing.step.position[:2]
             lower[0], upper[0] = offset - reach, offset + reach
         return lower, upper, axes, placement_lower, placement_upper, places
-
-
-def _transfer(step: Footstep, feet: Feet, end: float) -> Transfer | None:
-    """How the load goes to the foot that stays, before a walking `step` from `feet` that lifts at `end` [s]."""
-    if not step.adaptable:
-        return None
-    shares = ((1.0, 0.0), (0.0, 1.0))
-    before = (0.5, 0.5) if feet.last < 0 else shares[1 - feet.last]
-    return Transfer(end - step.double_support, before, shares[1 - step.side])

@@ -9,6 +9,7 @@ from wbmpc.signals import Vector
 
 NEAR = 0.12  # [m] obstacles farther than this from a point are left alone
 DISTANCE = 0.025  # [m] kept between an obstacle and the axis of an arm
+ARM_RADIUS = 0.0145  # [m] of a forearm
 LEG_RADIUS = 0.024  # [m] of the links of a leg
 SHARES = np.linspace(0.0, 1.0, 9)  # of the elbow in the points of a forearm that are looked at; the rest is the palm's
 
@@ -29,13 +30,14 @@ class KeepOut:
         """Half-spaces (2, 3, 5) of palm, elbow and the point between them that is nearest to anything: a, b, share.
 
         `palms`, `elbows` (2, 3), `leg_links` (4, 2, 3): ends of thighs and shanks, in world [m]; share: of the elbow in
-        the point, 0 … 1. A bar fits between three fixed
-        points of a forearm; the nearest one it cannot pass. Of a hand that is not `free` only the elbow's half of the
-        forearm counts: the palm is to come near to something.
+        the point, 0 … 1. A bar fits between three fixed points of a forearm; the nearest one it cannot pass. For a hand
+        that is not `free` obstacles only mind the elbow's half of the forearm: the palm is to come near to one.
         """
         points = palms[:, None] + SHARES[None, :, None] * (elbows - palms)[:, None]
         points = points.reshape(-1, 3)
         rows, distances = self.half_spaces(points)
+        reaching = np.repeat([not f for f in free], len(SHARES)) & (np.tile(SHARES, 2) < 0.5)
+        rows[reaching, 3], distances[reaching] = -np.inf, np.inf
         away, clearance = _from_links(points, leg_links)
         nearer = clearance < np.minimum(distances, NEAR)
         rows[nearer, :3] = away[nearer]
@@ -44,10 +46,14 @@ class KeepOut:
         rows, distances = rows.reshape(2, len(SHARES), 4), distances.reshape(2, len(SHARES))
         arms = np.empty((2, 3, 5))
         for side in range(2):
-            first = 1 if free[side] else len(SHARES) // 2
-            chosen = (0, first + int(np.argmin(distances[side, first:-1])), len(SHARES) - 1)
+            chosen = (0, 1 + int(np.argmin(distances[side, 1:-1])), len(SHARES) - 1)
             arms[side, :, :4], arms[side, :, 4] = rows[side, chosen], SHARES[list(chosen)]
         return arms
+
+    def forearm_gap(self, palm: Vector, elbow: Vector) -> float:
+        """Distance [m] from the surface of a forearm's elbow half to the nearest obstacle; palm and elbow (3,) [m]."""
+        points = palm + SHARES[SHARES >= 0.5, None] * (elbow - palm)
+        return float(self.half_spaces(points)[1].min()) - ARM_RADIUS
 
     def half_spaces(self, points: Vector) -> tuple[Vector, Vector]:
         """Half-spaces (n, 4): a point x of row (a, b) should keep a·x ≥ b; and distances (n,) [m] to the obstacles.

@@ -70,17 +70,14 @@ class Planner:
         )
         measured = self._measured = Snapshot(robot, q)
         stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
-        self._gait = Gait(
-            *(settings.gait, stepping),
-            soles=measured.soles,
-            yaws=measured.sole_yaws,
-            half_extents=robot.sole_half_extents,
-        )
+        self._gait = Gait(settings.gait, stepping, feet=measured.feet, half_extents=robot.sole_half_extents)
         self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
-        self._contacts = Contacts(robot, settings, patches, nominal=q, times=times, period=period)
+        self._contacts = Contacts(
+            robot, settings, patches, keep_out=self._keep_out, nominal=q, times=times, period=period
+        )
         self._references = References(
             robot, tasks, q=q, palms=measured.palms, height=float(measured.com[2]), times=times
         )
@@ -94,7 +91,6 @@ class Planner:
         start = perf_counter()
         events: list[str] = []
         settings, preview, contacts, references = self._settings, self._preview, self._contacts, self._references
-        measured = self._measured
         self._observe(state)
         self._advance(state, events)
         judged, gated_support = self._supports(state.time)
@@ -201,8 +197,7 @@ class Planner:
             modes=[mode for _, _, mode in hands],
             contacts=contacts.hands,
             arm_keep_out=self._keep_out.of_arms(
-                *(measured.palms, measured.elbows, measured.leg_links),
-                free=[mode == HandMode.FREE for _, _, mode in hands],
+                *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
             ),
         )
         return self._last

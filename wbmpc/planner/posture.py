@@ -60,6 +60,11 @@ class Posture:
         """Whether more iterations for the same targets would change nothing, or have been given up."""
         return self._step < SETTLED or self._left == 0
 
+    def forearm(self, side: int) -> tuple[Vector, Vector]:
+        """Palm and elbow (3,) of an arm in world [m] at the last iterate."""
+        kinematics, robot = self._kinematics, self._robot
+        return kinematics.position(robot.palm_frames[side]), kinematics.position(robot.elbow_frames[side])
+
     @property
     def torso_up(self) -> Vector:
         """(3,) the torso's own vertical in world at the last iterate."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.kinematics import Kinematics
+from wbmpc.planner.footstep import Feet
 from wbmpc.robot import Robot
 from wbmpc.rotations import heading_of
 from wbmpc.signals import RobotState, Vector
@@ -35,15 +36,23 @@ class Snapshot:
         """(2, 3) [m] where free palms hang: where they were at the start, as seen from the torso."""
         return self._torso_position + self._homes @ self._torso_rotation.T
 
+    @property
+    def feet(self) -> Feet:
+        """Where the feet stand, none of them having stepped."""
+        return Feet(self.soles.copy(), self.sole_yaws.copy(), -1)
+
+    @property
+    def limbs(self) -> tuple[Vector, Vector, Vector]:
+        """Palms (2, 3), elbows (2, 3) and the ends of thighs and shanks (4, 2, 3) [m]."""
+        return self.palms, self.elbows, self.leg_links
+
     def _read(self) -> None:
         kinematics, robot = self._kinematics, self._robot
         self.com, self.com_velocity = kinematics.com, kinematics.com_velocity  # (3,) [m], [m/s]
         self.palms = np.array([kinematics.position(f) for f in robot.palm_frames])  # (2, 3) [m]
         self.elbows = np.array([kinematics.position(f) for f in robot.elbow_frames])  # (2, 3) [m]
         joints = np.array([[kinematics.position(f) for f in leg] for leg in robot.leg_frames])  # (2, 3, 3)
-        self.leg_links = np.stack([joints[:, :-1], joints[:, 1:]], axis=2).reshape(
-            4, 2, 3
-        )  # [m] thighs, shanks
+        self.leg_links = np.stack([joints[:, :-1], joints[:, 1:]], axis=2).reshape(4, 2, 3)  # [m] thighs, shanks
         self.palm_velocities = np.array([kinematics.velocity(f)[:3] for f in robot.palm_frames])  # (2, 3) [m/s]
         self.soles = np.array([kinematics.position(f) for f in robot.sole_frames])  # (2, 3) [m]
         self.sole_yaws = np.array([heading_of(kinematics.rotation(f)) for f in robot.sole_frames])  # (2,) [rad]

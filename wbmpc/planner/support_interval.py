@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbmpc.planner.footstep import Feet
+from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.signals import Vector
 
@@ -18,6 +18,15 @@ class Transfer:
     begin: float  # [s from now]
     before: tuple[float, float]
     after: tuple[float, float]
+
+    @classmethod
+    def before_step(cls, step: Footstep, feet: Feet, end: float) -> Transfer | None:
+        """To the foot that stays, before a walking `step` from `feet` that lifts at `end` [s]; None for a stride."""
+        if not step.adaptable:
+            return None
+        shares = ((1.0, 0.0), (0.0, 1.0))
+        before = (0.5, 0.5) if feet.last < 0 else shares[1 - feet.last]
+        return cls(end - step.double_support, before, shares[1 - step.side])
 
 
 @dataclass(frozen=True, slots=True)
