@@ -59,6 +59,7 @@ class IdealGait:
     gait: Gait
     time: float = 0.0
     error: Vector = field(default_factory=lambda: np.zeros(2))  # [m] by which the next landing misses its place
+    carried: bool = True  # whether the foot that stays can carry the load alone
     events: list[str] = field(default_factory=list)
 
     @classmethod
@@ -82,7 +83,15 @@ class IdealGait:
             loads[side] = WEIGHT if touch else 0.0
             soles[side, :2] += self.error
         before = len(self.events)
-        gait.advance(self.time, DT, rate=rate, soles=soles, yaws=yaws, loads=loads, carried=True, events=self.events)
+        gait.advance(
+            *(self.time, DT),
+            rate=rate,
+            soles=soles,
+            yaws=yaws,
+            loads=loads,
+            carried=self.carried,
+            events=self.events,
+        )
         if any("landed" in event for event in self.events[before:]):
             self.error = np.zeros(2)
 

@@ -136,6 +136,19 @@ def test_a_closed_gate_holds_the_clock(phase: SupportPhase) -> None:
     assert run.gait.phase != phase
 
 
+def test_a_stride_waits_until_the_other_foot_carries_and_a_walk_does_not() -> None:
+    """A walk's next step is where it catches itself: it must not wait."""
+    stride, walking = IdealGait.of(step_task()), IdealGait.of(walk((0.0, 0.1, 0.0, 0.0)))
+    for run in (stride, walking):
+        run.carried = False
+        run.run(4.0)
+    assert stride.gait.phase == SupportPhase.DOUBLE
+    assert any("lifted" in event for event in walking.events)
+    stride.carried = True
+    stride.tick()
+    assert stride.gait.phase == SupportPhase.SINGLE
+
+
 def test_half_the_rate_takes_twice_the_time() -> None:
     run = swinging()
     begin = run.time

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wbmpc.planner.keep_out import DISTANCE, LEG_RADIUS, NEAR, KeepOut
+from wbmpc.planner.keep_out import ARM_RADIUS, DISTANCE, LEG_RADIUS, NEAR, KeepOut
 from wbmpc.scenario import Obstacle
 
 NO_LEGS = np.array([[[5.0, 0.0, 0.0], [5.0, 0.0, 1.0]]] * 4)
@@ -65,3 +65,13 @@ def test_a_palm_beside_a_thigh_is_shown_away_from_its_axis(angle: float, gap: fl
     row = KeepOut(()).of_arms(palms, palms + 0.3 * outward, legs, free=[True, True])[0, 0]
     assert np.allclose(row[:3], outward)
     assert abs(row[:3] @ palms[0] - row[3] - (gap - DISTANCE)) < 1e-9
+
+
+@settings(max_examples=40, deadline=None)
+@given(y=st.floats(-0.1, 0.1), z=st.floats(-0.1, 0.25), yaw=st.floats(-3.0, 3.0))
+def test_the_gap_of_a_forearm_is_that_of_its_elbow_half(y: float, z: float, yaw: float) -> None:
+    obstacle = box((0.15, -0.02, 0.1), (0.05, 0.04, 0.06), yaw)
+    palm, elbow = np.array([0.0, y, z]), np.array([0.02, y - 0.1, z + 0.02])
+    axis = palm + np.linspace(0.5, 1.0, 60)[:, None] * (elbow - palm)
+    distances = np.linalg.norm(surface_points(obstacle)[:, None] - axis[None], axis=2)
+    assert abs(KeepOut((obstacle,)).forearm_gap(palm, elbow) + ARM_RADIUS - distances.min()) < 0.006
