@@ -11,7 +11,7 @@ from wbmpc.robot import Robot
 from wbmpc.rotations import heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
 
-SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, TORSO_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 1e-2, 2e-3
+SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 2e-3
 ELBOW_CLEARANCE = 0.03  # [m] of an elbow over the tangent plane through its palm: the forearm is as thick as the palm
 DAMPING = 1e-2
 STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
@@ -31,7 +31,7 @@ class PalmTarget:
 
 class Posture:
     """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 3e2 Σ(elbow too low)²
-    + w |c_xy − centre|² + 3 (c_z − nominal)² + 1e-2 (torso's tilt)² + 2e-3 |posture error|².
+    + w |c_xy − centre|² + 3 (c_z − nominal)² + 2e-3 |posture error|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
     the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
@@ -126,11 +126,6 @@ class Posture:
             J = kinematics.com_jacobian[2]
             H += HEIGHT_COST * np.outer(J, J)
             g += HEIGHT_COST * (self._height - self.com[2]) * J
-            up = kinematics.rotation(robot.torso_frame)[:, 2]
-            J = kinematics.jacobian(robot.torso_frame)[3:5]
-            tilt = np.arctan2(np.hypot(up[0], up[1]), up[2]) / max(float(np.hypot(up[0], up[1])), 1e-9)
-            H += TORSO_COST * (J.T @ J)
-            g += TORSO_COST * tilt * (J.T @ np.array([up[1], -up[0]]))  # about the axis up × z
             diagonal = H.reshape(-1)[:: nv + 1]
             diagonal[6:] += POSTURE_COST
             g[6:] += POSTURE_COST * (self._nominal[7:] - self.q[7:])
