@@ -95,6 +95,9 @@ def _named_problems(model: mujoco.MjModel) -> list[str]:
         for name, kind in (
             (f"{side}_foot", mujoco.mjtGeom.mjGEOM_BOX),
             (f"{side}_palm_geom", mujoco.mjtGeom.mjGEOM_SPHERE),
+            (f"{side}_forearm", mujoco.mjtGeom.mjGEOM_CAPSULE),
+            (f"{side}_thigh", mujoco.mjtGeom.mjGEOM_CAPSULE),
+            (f"{side}_shank", mujoco.mjtGeom.mjGEOM_CAPSULE),
         ):
             shape = "box" if kind == mujoco.mjtGeom.mjGEOM_BOX else "sphere"
             if not _has(model, mujoco.mjtObj.mjOBJ_GEOM, name):

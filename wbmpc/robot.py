@@ -53,6 +53,8 @@ class Robot:
     arm_joints: tuple[NDArray[np.int64], NDArray[np.int64]]  # joint indices from shoulder to palm
     sole_half_extents: Vector  # (2,) [m] half length (x) and half width (y)
     palm_radius: float  # [m]
+    forearm_radius: float  # [m]
+    leg_radius: float  # [m] of the thicker of thigh and shank
     arm_length: float  # [m] from the shoulder to the palm centre, arm stretched
 
     @classmethod
@@ -97,6 +99,8 @@ class Robot:
             arm_joints=(_joint_indices(arms[0]), _joint_indices(arms[1])),
             sole_half_extents=_frozen(mj_model.geom("left_foot").size[:2]),
             palm_radius=float(mj_model.geom("left_palm_geom").size[0]),
+            forearm_radius=float(mj_model.geom("left_forearm").size[0]),
+            leg_radius=max(float(mj_model.geom(f"left_{link}").size[0]) for link in ("thigh", "shank")),
             arm_length=_stretched_length(pin_model, arms[0], palm_frames[0]),
         )
 

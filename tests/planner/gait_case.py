@@ -59,7 +59,7 @@ class IdealGait:
     gait: Gait
     time: float = 0.0
     error: Vector = field(default_factory=lambda: np.zeros(2))  # [m] by which the next landing misses its place
-    carried: bool = True  # whether the foot that stays can carry the load alone
+    zmp: Vector | None = None  # [m] of the feet; None: where the foot that stays can carry it
     events: list[str] = field(default_factory=list)
 
     @classmethod
@@ -89,11 +89,16 @@ class IdealGait:
             soles=soles,
             yaws=yaws,
             loads=loads,
-            carried=self.carried,
+            zmp=self._carried() if self.zmp is None else self.zmp,
             events=self.events,
         )
         if any("landed" in event for event in self.events[before:]):
             self.error = np.zeros(2)
+
+    def _carried(self) -> Vector:
+        """The middle of the foot that stays at the step ahead."""
+        step = self.gait.step
+        return self.gait.feet.positions[0 if step is None else 1 - step.side, :2]
 
     def run(self, seconds: float) -> None:
         for _ in range(round(seconds / DT)):

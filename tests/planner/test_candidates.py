@@ -20,7 +20,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def candidates(*places: Vector, obstacles: tuple[Obstacle, ...] = ()) -> Candidates:
     patches = tuple(PatchPose(f"patch_{i}", "ledge", place, UP, 0.5, 20.0) for i, place in enumerate(places))
-    return Candidates(ROBOT, patches, ContactSettings(), keep_out=KeepOut(obstacles), nominal=HOME, backend="daqp")
+    keep_out = KeepOut(obstacles, forearm_radius=ROBOT.forearm_radius, leg_radius=ROBOT.leg_radius)
+    return Candidates(ROBOT, patches, ContactSettings(), keep_out=keep_out, nominal=HOME, backend="daqp")
 
 
 def refresh(them: Candidates, feet: Vector, *, plans: int, used: list[Candidate] | None = None) -> None:

@@ -140,11 +140,11 @@ def test_a_stride_waits_until_the_other_foot_carries_and_a_walk_does_not() -> No
     """A walk's next step is where it catches itself: it must not wait."""
     stride, walking = IdealGait.of(step_task()), IdealGait.of(walk((0.0, 0.1, 0.0, 0.0)))
     for run in (stride, walking):
-        run.carried = False
+        run.zmp = run.gait.feet.positions[:, :2].mean(axis=0)  # between the feet
         run.run(4.0)
     assert stride.gait.phase == SupportPhase.DOUBLE
     assert any("lifted" in event for event in walking.events)
-    stride.carried = True
+    stride.zmp = None
     stride.tick()
     assert stride.gait.phase == SupportPhase.SINGLE
 
@@ -366,7 +366,7 @@ def test_a_full_turn_keeps_its_heading() -> None:
             soles=now.positions,
             yaws=measured,
             loads=loads,
-            carried=True,
+            zmp=now.positions[0, :2],
             events=run.events,
         )
         assert abs(gait.feet.yaws[0] - gait.feet.yaws[1]) < 1.0

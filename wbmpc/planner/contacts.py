@@ -202,7 +202,7 @@ class Contacts:
         stage = NOT_RUN
         free = [not c.busy and not taken for c, taken in zip(self.hands, hand_taken, strict=True)]
         if not self._needed:
-            self._hopeless, self._spare, self._short = 0.0, None, False
+            self._hopeless, self._waited, self._spare, self._short = 0.0, 0.0, None, False
         elif self.candidates.all:
             self._waited = 0.0 if self.candidates.settled else self._waited + self._period
             if self._known and self._since_review >= RETRY_PLANS and (any(free) or len(self._committed) > 1):

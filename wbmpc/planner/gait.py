@@ -19,6 +19,7 @@ from wbmpc.signals import SIDES, Vector
 
 EARLY = 0.6  # share of the swing from which a touch counts as the landing
 SEARCH_TIME = 0.6  # [s] after which a foot that finds no ground is taken for landed
+LIFT_INSET = 0.005  # [m] of the pressure inside the sole that stays when a stride's foot lifts
 NEVER = 1e3  # [s]
 
 
@@ -96,7 +97,7 @@ class Gait:
         soles: Vector,
         yaws: Vector,
         loads: Vector,
-        carried: bool,
+        zmp: Vector,
         events: list[str],
     ) -> None:
         """Move the clock on by dt [s] at `rate` (0 … 1: the gate).
@@ -104,7 +105,7 @@ class Gait:
         Args:
             soles, yaws: measured (2, 3) [m], (2,) [rad]: a foot stands where it has landed.
             loads: (2,) measured vertical forces [N].
-            carried: whether the feet's pressure is where the foot that stays can carry it alone: a stride waits for it.
+            zmp: (2,) measured centre of the feet's pressure [m]: a stride waits until it is in the sole that stays.
         """
         settings = self._settings
         if self.phase != SupportPhase.SINGLE:
@@ -117,7 +118,7 @@ class Gait:
                 self._left = max(settings.first_double_support, wanted.double_support)
             self.step = wanted
             self._left = max(0.0, self._left - rate * dt)
-            if self._left <= 1e-9 and (carried or wanted.adaptable):
+            if self._left <= 1e-9 and (wanted.adaptable or self.goal_polygon(LIFT_INSET).excess(zmp) <= 0.0):
                 self._lift(wanted, events)
             return
         assert self.swing is not None
@@ -176,7 +177,6 @@ class Gait:
             rate: at which the present phase goes on (0 … 1).
             margin: inset of the polygons [m], growing by `growth` [m/s].
         """
-        half_extents = self._half_extents
         intervals, steps = self._intervals(time, float(times[-1]), rate)
         n, m = len(times), MAX_FOOTSTEPS
         shift = np.zeros((n, m))
@@ -191,7 +191,7 @@ class Gait:
             interval = intervals[which]
             moving = interval.weights(t) is not None
             if moving or which not in made:
-                polygon = interval.polygon(t, half_extents=half_extents, margin=margin)
+                polygon = interval.polygon(t, half_extents=self._half_extents, margin=margin)
                 if not moving:
                     made[which] = polygon
             else:
@@ -204,7 +204,7 @@ class Gait:
         last = intervals[which]
         both = last if last.swing < 0 else intervals[min(which + 1, len(intervals) - 1)]
         at_rest = Interval(NEVER, both.feet, -1, both.moved)
-        rest = at_rest.polygon(0.0, half_extents=half_extents, margin=margin + growth * float(times[-1]))
+        rest = at_rest.polygon(0.0, half_extents=self._half_extents, margin=margin + growth * float(times[-1]))
         lower, upper, axes, placement_lower, placement_upper, places = self._bounds(steps)
         return SupportPreview(
             normals=np.array([p.normals for p in polygons]),

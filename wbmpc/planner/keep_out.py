@@ -9,15 +9,15 @@ from wbmpc.signals import Vector
 
 NEAR = 0.12  # [m] obstacles farther than this from a point are left alone
 DISTANCE = 0.025  # [m] kept between an obstacle and the axis of an arm
-ARM_RADIUS = 0.0145  # [m] of a forearm
-LEG_RADIUS = 0.024  # [m] of the links of a leg
 SHARES = np.linspace(0.0, 1.0, 9)  # of the elbow in the points of a forearm that are looked at; the rest is the palm's
 
 
 class KeepOut:
     """The obstacles as free arms see them."""
 
-    def __init__(self, obstacles: tuple[Obstacle, ...]) -> None:
+    def __init__(self, obstacles: tuple[Obstacle, ...], *, forearm_radius: float, leg_radius: float) -> None:
+        """`forearm_radius`, `leg_radius` [m]: of the robot's links as capsules."""
+        self._forearm_radius, self._leg_radius = forearm_radius, leg_radius
         k = len(obstacles)
         self._centres = np.array([o.centre for o in obstacles]).reshape(k, 3)
         self._halves = np.array([o.half for o in obstacles]).reshape(k, 3)
@@ -38,7 +38,8 @@ class KeepOut:
         rows, distances = self.half_spaces(points)
         reaching = np.repeat([not f for f in free], len(SHARES)) & (np.tile(SHARES, 2) < 0.5)
         rows[reaching, 3], distances[reaching] = -np.inf, np.inf
-        away, clearance = _from_links(points, leg_links)
+        away, clearance = _from_axes(points, leg_links)
+        clearance -= self._leg_radius
         nearer = clearance < np.minimum(distances, NEAR)
         rows[nearer, :3] = away[nearer]
         rows[nearer, 3] = (np.einsum("ni,ni->n", away, points) - clearance + DISTANCE)[nearer]
@@ -53,7 +54,7 @@ class KeepOut:
     def forearm_gap(self, palm: Vector, elbow: Vector) -> float:
         """Distance [m] from the surface of a forearm's elbow half to the nearest obstacle; palm and elbow (3,) [m]."""
         points = palm + SHARES[SHARES >= 0.5, None] * (elbow - palm)
-        return float(self.half_spaces(points)[1].min()) - ARM_RADIUS
+        return float(self.half_spaces(points)[1].min()) - self._forearm_radius
 
     def half_spaces(self, points: Vector) -> tuple[Vector, Vector]:
         """Half-spaces (n, 4): a point x of row (a, b) should keep a·x ≥ b; and distances (n,) [m] to the obstacles.
@@ -81,11 +82,11 @@ class KeepOut:
         return rows, distances.min(axis=1)
 
 
-def _from_links(points: Vector, links: Vector) -> tuple[Vector, Vector]:
-    """Unit directions (n, 3) away from the nearest of the links' capsules, and distances (n,) [m] to it."""
+def _from_axes(points: Vector, links: Vector) -> tuple[Vector, Vector]:
+    """Unit directions (n, 3) away from the nearest of the links' axes (k, 2, 3), and distances (n,) [m] to it."""
     begin, along = links[:, 0], links[:, 1] - links[:, 0]
     shares = np.einsum("nki,ki->nk", points[:, None] - begin, along) / np.einsum("ki,ki->k", along, along)
     offsets = points[:, None] - begin - np.clip(shares, 0.0, 1.0)[:, :, None] * along
     distances = np.sqrt(np.einsum("nki,nki->nk", offsets, offsets))
     nearest = (np.arange(len(points)), np.argmin(distances, axis=1))
-    return offsets[nearest] / np.maximum(distances[nearest], 1e-9)[:, None], distances[nearest] - LEG_RADIUS
+    return offsets[nearest] / np.maximum(distances[nearest], 1e-9)[:, None], distances[nearest]

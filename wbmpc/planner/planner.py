@@ -33,7 +33,6 @@ from wbmpc.scenario import Obstacle, PatchPose, Task
 from wbmpc.signals import CandidateReport, HandMode, PlanReport, RobotState, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
-LIFT_INSET = 0.005  # [m] of the pressure inside the foot that stays when a stride's foot lifts
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
 STRIDE_ITERATIONS = 50  # when a stride is asked for: half-finished postures would call for contacts
 
@@ -61,7 +60,8 @@ class Planner:
         period: float,
     ) -> None:
         """Start from rest at configuration `q` (nq,); `period` is the time between two plans [s]."""
-        self._robot, self._settings, self._period, self._keep_out = robot, settings, period, KeepOut(obstacles)
+        self._robot, self._settings, self._period = robot, settings, period
+        self._keep_out = KeepOut(obstacles, forearm_radius=robot.forearm_radius, leg_radius=robot.leg_radius)
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
         self._need_stage, self._motion_stage = (
@@ -223,7 +223,6 @@ class Planner:
         go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
         self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
         self._gait.aim(self._footstep_shift[0], dt)
-        stance = self._gait.goal_polygon(LIFT_INSET)
         self._gait.advance(
             state.time,
             dt,
@@ -231,7 +230,7 @@ class Planner:
             soles=self._measured.soles,
             yaws=self._measured.sole_yaws,
             loads=state.sole_wrench_in_world[:, 2],
-            carried=stance.excess(self._measured.feet_zmp) <= 0.0,
+            zmp=self._measured.feet_zmp,
             events=events,
         )
         references.advance(
