@@ -16,8 +16,13 @@ from wbmpc.signals import SolveStatus, Vector
 
 ITERATION_LIMIT = 2000
 # Pivots below sing_tol mark dependent active rows; primal_tol is the violation of a row scaled to unit norm in the
-# metric of H⁻¹. The second set is for problems on which the first makes daqp cycle.
-TOLERANCES = ({"sing_tol": 1e-9, "primal_tol": 1e-8}, {"sing_tol": 1e-7, "primal_tol": 1e-6})
+# metric of H⁻¹. The other sets are for ill-conditioned problems, on which the first makes daqp cycle or call a feasible
+# problem infeasible.
+TOLERANCES = (
+    {"sing_tol": 1e-9, "primal_tol": 1e-8},
+    {"sing_tol": 1e-11, "primal_tol": 1e-6},
+    {"sing_tol": 1e-7, "primal_tol": 1e-6},
+)
 DUALITY_GAP = 1e-6  # relative; an honest optimum has about 1e-9
 _SOFT = 8  # bit of daqp's constraint sense
 _STATUS = {
@@ -116,7 +121,7 @@ def solve_cold(
     """
     for tolerances in TOLERANCES:
         model, x, status, iterations = _solve_fresh(data, sense, reciprocal, tolerances)
-        if status is not SolveStatus.NUMERICAL_ERROR:
+        if status is SolveStatus.SOLVED:
             break
     return model, x, status, iterations
 
