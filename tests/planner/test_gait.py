@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gait_case import DT, HALF, PERIOD, SETTINGS, IdealGait, Velocity, feet_at, sole, step_task, walk
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -265,6 +265,7 @@ def test_rows_move_with_the_footsteps(command: Velocity, ticks: int, x: float, y
             assert abs(promised - found) <= (1e-6 if single and max(before.shift[k]) == 1.0 else on_two)
 
 
+@example(seed=0, share=0.5, yaw=2.220446049250313e-16)  # corners whose x differ by rounding only
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0), yaw=st.floats(-0.5, 0.5))
 def test_a_transfer_moves_exactly_with_its_footsteps(seed: int, share: float, yaw: float) -> None:
     """The sole that slides from foot to foot, both displaced, is where the shares say; at its ends it is a foot."""
@@ -281,7 +282,7 @@ def test_a_transfer_moves_exactly_with_its_footsteps(seed: int, share: float, ya
     by = shares[:2] @ displaced[::-1]  # footstep 0 is the right foot's, 1 the left foot's
     for angle in 2 * np.pi * np.arange(16) / 16:
         u = np.array([np.cos(angle), np.sin(angle)])
-        assert reach(here, u) + by @ u == pytest.approx(reach(there, u), abs=1e-12)
+        assert reach(here, u) + by @ u == pytest.approx(reach(there, u), abs=1e-9)  # the hull drops corners so flat
     for time, side in ((0.2, 0), (0.35, 1)):
         end = Interval(0.35, feet, -1, (1, 0), transfer).polygon(time, half_extents=HALF, margin=0.0)
         foot = SupportPolygon.of_corners(sole(feet, side), margin=0.0, plane_height=0.0)

@@ -27,7 +27,8 @@ def foot_corners(*, position: Vector, yaw: float, half_extents: Vector) -> Vecto
 
 def convex_hull(points: Vector) -> Vector:
     """Convex hull (k, 2) of points (n, 2), counter-clockwise, collinear points dropped (monotone chain)."""
-    order = points[np.lexsort((points[:, 1], points[:, 0]))].tolist()
+    y, x = points[:, 1].round(9), points[:, 0].round(9)  # rounded: of a side turned by 1e-16 no corner may be lost
+    order = points[np.lexsort((y, x))].tolist()
 
     def chain(sequence: list[list[float]]) -> list[list[float]]:
         hull: list[list[float]] = []
