@@ -18,7 +18,7 @@ from wbmpc.signals import Vector
 
 HALF = np.array([0.06, 0.035])  # [m] of a sole
 DT = 0.01  # [s]
-SETTINGS = GaitSettings()
+SETTINGS = GaitSettings(swing_time=0.5, double_support=0.15)  # a transfer longer than a knot: several plans see it
 PERIOD = SETTINGS.swing_time + SETTINGS.double_support  # [s] of one step
 WEIGHT = 30.0  # [N] on a foot that stands
 Velocity = tuple[float, float, float]

@@ -69,8 +69,10 @@ class WholeBodySettings(StrictModel):
 class GaitSettings(StrictModel):
     """Steps: their timing, their size, the swing foot."""
 
-    swing_time: float = Field(0.5, gt=0.1, description="[s] single support of a walking step")
-    double_support: float = Field(0.15, gt=0.02, description="[s] between two walking steps")
+    swing_time: float = Field(
+        0.45, gt=0.1, description="[s] single support of a walking step: so low a CoM falls e times further in 0.16 s"
+    )
+    double_support: float = Field(0.05, gt=0.02, description="[s] between two walking steps")
     first_double_support: float = Field(0.5, gt=0.1, description="[s] to shift the weight before the first step")
     stride_double_support: float = Field(1.0, gt=0.1, description="[s] before a step that is planned with a posture")
     step_height: float = Field(0.025, gt=0, description="[m] how high a swing foot is lifted over the ground")
