@@ -33,7 +33,7 @@ ANY_PUSH = "checks.0.min_impulse=0.01"  # the scenario asks for a push of a cert
 ONE_COMMAND = "tasks.0.commands=[{time: 0.5, velocity: [%s], yaw_rate: %s}, {time: 5.0, velocity: [0.0, 0.0]}]"
 UPRIGHT = ("duration=7.5", "checks=[{kind: upright_at_end}]", "counterfactuals={}", "sweep=null")
 ONLY_WALK = (*UPRIGHT, "disturbances=[]")
-WALK_PUSH = (*UPRIGHT, ONE_COMMAND % ("0.1, 0.0", "0.0"))
+WALK_PUSH = (*UPRIGHT, ONE_COMMAND % ("0.125, 0.0", "0.0"))
 PUSHED = "disturbances=[{kind: impulse, body: torso, time: 2.6, duration: 0.1, impulse: [%s]}]"
 
 
