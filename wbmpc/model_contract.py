@@ -92,17 +92,16 @@ def _named_problems(model: mujoco.MjModel) -> list[str]:
     if not _has(model, mujoco.mjtObj.mjOBJ_KEY, "home"):
         problems.append("no keyframe 'home'")
     for side in SIDES:
-        for name, kind in (
-            (f"{side}_foot", mujoco.mjtGeom.mjGEOM_BOX),
-            (f"{side}_palm_geom", mujoco.mjtGeom.mjGEOM_SPHERE),
-            (f"{side}_forearm", mujoco.mjtGeom.mjGEOM_CAPSULE),
-            (f"{side}_thigh", mujoco.mjtGeom.mjGEOM_CAPSULE),
-            (f"{side}_shank", mujoco.mjtGeom.mjGEOM_CAPSULE),
+        for name, shape in (
+            (f"{side}_foot", "box"),
+            (f"{side}_palm_geom", "sphere"),
+            (f"{side}_forearm", "capsule"),
+            (f"{side}_thigh", "capsule"),
+            (f"{side}_shank", "capsule"),
         ):
-            shape = "box" if kind == mujoco.mjtGeom.mjGEOM_BOX else "sphere"
             if not _has(model, mujoco.mjtObj.mjOBJ_GEOM, name):
                 problems.append(f"no {shape} geom {name!r}")
-            elif model.geom(name).type[0] != kind:
+            elif model.geom(name).type[0] != getattr(mujoco.mjtGeom, f"mjGEOM_{shape.upper()}"):
                 problems.append(f"geom {name!r} is not a {shape}")
     return problems
 
