@@ -244,6 +244,8 @@ def _rename_root(root: ElementTree.Element) -> None:
         pytest.param(_remove("site", "left_sole"), "no site 'left_sole'", id="no sole"),
         pytest.param(_remove("site", "right_palm"), "no site 'right_palm'", id="no palm"),
         pytest.param(_remove("key", "home"), "no keyframe 'home'", id="no keyframe"),
+        pytest.param(_remove("geom", "left_forearm"), "no capsule geom 'left_forearm'", id="no forearm"),
+        pytest.param(_set("geom", "right_shank", type="box"), "geom 'right_shank' is not a capsule", id="shank a box"),
         pytest.param(_remove("geom", "left_foot"), "no box geom 'left_foot'", id="no foot"),
         pytest.param(_set("geom", "left_foot", type="capsule"), "geom 'left_foot' is not a box", id="foot not a box"),
         pytest.param(
