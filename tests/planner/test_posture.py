@@ -120,3 +120,23 @@ def test_an_elbow_stays_above_the_surface_its_palm_rests_on(x: float, y: float, 
     assert posture.elbow_excess == pytest.approx(max(short, 0.0), abs=1e-4)
     assert short < 0.01
     assert_allclose(palm, target, atol=4e-3)
+
+
+@settings(max_examples=10, deadline=None)
+@given(x=st.floats(-5.0, 5.0), y=st.floats(-5.0, 5.0), yaw=st.floats(-3.0, 3.0))
+def test_the_same_task_elsewhere_in_the_world_gets_the_same_posture(x: float, y: float, yaw: float) -> None:
+    """Started at the world's origin, however far off, it ended bent double."""
+    turn, shift = level_frame(yaw), np.array([x, y, 0.0])
+    palm, up = np.array([0.02, -0.21, 0.25]), np.array([0.0, 0.0, 1.0])
+    here, there = (Posture(ROBOT, nominal=HOME, com_cost=COM_COST) for _ in range(2))
+    here.iterate(60, soles=SOLES, yaws=YAWS, palms=[None, PalmTarget(palm, up)], centre=CENTRE)
+    there.iterate(
+        60,
+        soles=SOLES @ turn.T + shift,
+        yaws=YAWS + yaw,
+        palms=[None, PalmTarget(turn @ palm + shift, up)],
+        centre=turn[:2, :2] @ CENTRE + shift[:2],
+    )
+    assert_allclose(there.q[7:], here.q[7:], atol=1e-4)
+    assert_allclose(there.com, turn @ here.com + shift, atol=1e-4)
+    assert there.residual == pytest.approx(here.residual, abs=1e-5)

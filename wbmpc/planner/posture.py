@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.robot import Robot
@@ -44,6 +45,8 @@ class Posture:
         self._kinematics = Kinematics(robot)
         self._kinematics.update_kinematics(nominal)
         self._height = float(self._kinematics.com[2])
+        feet = np.array([self._kinematics.position(f) for f in robot.sole_frames])
+        self._base_offset = nominal[:2] - feet[:, :2].mean(axis=0)  # (2,) [m]
         self._lower, self._upper = robot.joint_lower + JOINT_MARGIN, robot.joint_upper - JOINT_MARGIN
         self.q = nominal.copy()  # (nq,)
         self.com = np.zeros(3)  # [m] of the last iterate
@@ -89,7 +92,7 @@ class Posture:
         robot, kinematics, nv = self._robot, self._kinematics, self._robot.nv
         reached = tuple(p is not None for p in palms)
         if reached != self._reached:  # other hands: from the start, a neighbouring optimum can be a contorted one
-            self.q, self._reached = self._nominal.copy(), reached
+            self.q, self._reached = self._start(soles, yaws), reached
         targets = (
             soles.tobytes(),
             yaws.tobytes(),
@@ -144,6 +147,13 @@ class Posture:
             self.q = robot.integrate(self.q, delta)
             np.clip(self.q[7:], self._lower, self._upper, out=self.q[7:])
             self._step = float(np.abs(delta).max())
+
+    def _start(self, soles: Vector, yaws: Vector) -> Vector:
+        """The nominal posture (nq,) over the feet: from afar the way there ends in a contorted optimum."""
+        q, turn = self._nominal.copy(), level_frame(float(yaws.mean()))
+        q[:2] = soles[:, :2].mean(axis=0) + turn[:2, :2] @ self._base_offset
+        q[3:7] = (pin.Quaternion(turn) * pin.Quaternion(q[3:7])).coeffs()
+        return q
 
     def _add_palms(self, palms: list[PalmTarget | None], H: Vector, g: Vector) -> None:
         """Add the palms' and elbows' terms to the normal equations  H (nv, nv), g (nv,)."""
