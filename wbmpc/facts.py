@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import mujoco
 import numpy as np
 
-from wbmpc.checks.context import Facts
+from wbmpc.checks.context import Facts, LiftedObject
 from wbmpc.robot import Robot
 from wbmpc.scenario.consistency import FLOOR
 from wbmpc.scenario.patches import PatchPose
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import StepTask
+from wbmpc.scenario.schema.tasks import LiftTask, StepTask
 from wbmpc.signals import SIDES, Vector
 
 
@@ -49,12 +49,21 @@ def facts_of(model: mujoco.MjModel, robot: Robot, scenario: Scenario, patches: S
         patch_geoms={patch.name: _geoms_of(model, patch.object) for patch in patches},
         patch_normal={patch.name: patch.normal for patch in patches},
         patch_force_cap={patch.name: patch.force_cap for patch in patches},
+        lifted_objects=tuple(_lifted_objects(model, scenario)),
         step_targets=tuple((SIDES.index(task.foot), np.array(task.target)) for task in steps),
         go_targets=tuple(np.array(task.target) for task in tasks if task.kind == "go"),
         reach_targets=tuple(np.array(task.target) for task in tasks if task.kind == "reach"),
         com_heights=tuple((p.time, p.height) for task in tasks if task.kind == "com_height" for p in task.waypoints),
         sole_vertices=_sole_corners(model, robot),
     )
+
+
+def _lifted_objects(model: mujoco.MjModel, scenario: Scenario) -> Iterator[LiftedObject]:
+    for task in scenario.tasks:
+        if isinstance(task, LiftTask) and (geoms := _geoms_of(model, task.object)):
+            joint = int(model.body(task.object).jntadr[0])
+            half = np.array(scenario.world.objects[task.object].size) / 2
+            yield LiftedObject(task.object, geoms, int(model.jnt_qposadr[joint]), half)
 
 
 def _geom_name(model: mujoco.MjModel, geom: int) -> str:

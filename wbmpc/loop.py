@@ -18,7 +18,7 @@ from wbmpc.planner.planner import Planner
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
-from wbmpc.scenario import Scenario, build_world, resolve_obstacles, resolve_patches
+from wbmpc.scenario import Scenario, build_world, resolve_loads, resolve_obstacles, resolve_patches
 from wbmpc.signals import RobotState, Vector
 from wbmpc.tracker.tracker import Tracker
 
@@ -60,7 +60,7 @@ class Session:
         loop = scenario.loop
         self.step, self.ticks = loop.timestep, round(scenario.duration * loop.physics_rate)
         qpos = initial_posture(scenario, robot, model)
-        q = robot.q_from_qpos(qpos)
+        q = robot.q_from_qpos(qpos[: robot.nq])
         self.plant = Plant(
             model,
             robot,
@@ -76,6 +76,7 @@ class Session:
             tasks=scenario.tasks,
             patches=resolve_patches(scenario),
             obstacles=resolve_obstacles(scenario),
+            loads=resolve_loads(scenario),
             q=q,
             period=loop.planner_period_ticks * self.step,
         )
@@ -178,7 +179,7 @@ def no_garbage_collection() -> Iterator[None]:
 
 
 def initial_posture(scenario: Scenario, robot: Robot, model: mujoco.MjModel) -> Vector:
-    """MuJoCo configuration (nq,) at the start: the keyframe, the scenario's joints, the soles on the floor."""
+    """MuJoCo configuration (nq,) at the start: the keyframe, the scenario's joints, the soles on the floor, objects."""
     qpos = model.key(scenario.initial.keyframe).qpos.copy()
     for name, angle in scenario.initial.joints.items():
         qpos[7 + robot.joint_index(name)] = angle

@@ -31,7 +31,7 @@ class Plant:
         qpos: Vector,
         seed: int,
     ) -> None:
-        """Place the robot at `qpos` (nq,) at rest; `seed` fixes all sensor noise."""
+        """Place robot and free objects at `qpos` (nq,) at rest, the robot's part first; `seed` fixes all sensor noise."""
         self.model, self._robot, self._sensors = model, robot, sensors
         self.data = mujoco.MjData(model)
         self._step = model.opt.timestep
@@ -68,7 +68,7 @@ class Plant:
         """What the sensors say now. Contact forces are those of the last step: a force sensor integrates over one."""
         d, nj = self.data, self._robot.nj
         noise = self._noise * self._rng.standard_normal(self._noise.size) if self._sensors.noise_scale else None
-        joint_position, joint_velocity = d.qpos[7:].copy(), d.qvel[6:].copy()
+        joint_position, joint_velocity = d.qpos[7 : 7 + nj].copy(), d.qvel[6 : 6 + nj].copy()
         quaternion = d.sensordata[self._sensor["imu_quaternion"]].copy()
         gyro = d.sensordata[self._sensor["imu_gyro"]].copy()
         accelerometer = d.sensordata[self._sensor["imu_accelerometer"]].copy()
@@ -99,7 +99,7 @@ class Plant:
         """Apply `torque` (nj,) [N·m], clipped to the servo's torque-speed line, for one step; returns what happened."""
         m, d, robot = self.model, self.data, self._robot
         time, qpos, qvel = float(d.time), d.qpos.copy(), d.qvel.copy()
-        speed = qvel[6:] / robot.joint_speed
+        speed = qvel[6 : 6 + robot.nj] / robot.joint_speed
         upper = robot.torque_limit * np.minimum(np.maximum(1.0 - speed, 0.0), 1.0)
         lower = robot.torque_limit * np.maximum(np.minimum(-1.0 - speed, 0.0), -1.0)
         applied = np.minimum(np.maximum(torque, lower), upper)

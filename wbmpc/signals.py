@@ -37,6 +37,7 @@ class HandMode(IntEnum):
     FREE = 0  # posture only
     MOVE = 1  # track the commanded palm position (reach, approach, retract)
     CONTACT = 2  # palm held on a surface, force tracked
+    CARRY = 3  # palm moves with a thing held between both hands, its force known
 
 
 class ContactPhase(IntEnum):

@@ -14,7 +14,8 @@ from wbmpc.signals import SIDES
 class DeclaredContactsCheck:
     """Largest force of a contact that nobody declared: no foot where it may stand, no chosen palm on its object.
 
-    A foot may stand on the floor and on walkable objects, and touch these alone. Objects may touch one another.
+    A foot may stand on the floor and on walkable objects, and touch these alone; a palm may touch what is to be lifted.
+    Objects may touch one another.
     """
 
     def __init__(self, config: settings.DeclaredContacts) -> None:
@@ -25,7 +26,9 @@ class DeclaredContactsCheck:
         robot_geom, other_geom, outside = context.contact_sides
         both_robot = facts.geom_is_robot[robot_geom] & facts.geom_is_robot[other_geom]
         foot_on_ground = outside & (facts.geom_foot[robot_geom] >= 0) & facts.geom_walkable[other_geom]
-        declared = ~(outside | both_robot) | foot_on_ground | self._chosen_palm(context)
+        to_lift = [geom for thing in facts.lifted_objects for geom in thing.geoms]
+        palm_on_load = outside & (facts.geom_palm[robot_geom] >= 0) & np.isin(other_geom, to_lift)
+        declared = ~(outside | both_robot) | foot_on_ground | palm_on_load | self._chosen_palm(context)
         force = np.linalg.norm(contacts.force, axis=1)  # (c,)
         undeclared = ~declared & ~(force <= self.config.min_force)
         if not undeclared.any():

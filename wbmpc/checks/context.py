@@ -18,6 +18,16 @@ SAMPLE_PERIOD = 0.01  # [s] the soles' corners are evaluated this often: they mo
 
 
 @dataclass(frozen=True, slots=True)
+class LiftedObject:
+    """A box that the robot is asked to lift and that the world contains."""
+
+    name: str
+    geoms: frozenset[int]
+    qpos: int  # where its pose begins in qpos: position, then quaternion wxyz
+    half: Vector  # (3,) [m] half edge lengths
+
+
+@dataclass(frozen=True, slots=True)
 class Facts:
     """True facts of the plant (not of the controller's model), per geom id, per joint, per patch."""
 
@@ -35,6 +45,7 @@ class Facts:
     patch_geoms: Mapping[str, frozenset[int]]  # geoms of the object that carries each candidate patch
     patch_normal: Mapping[str, Vector]  # (3,) out of the surface, in world
     patch_force_cap: Mapping[str, float]  # [N] largest normal force that the planner may ask for
+    lifted_objects: tuple[LiftedObject, ...]  # of the scenario's lift tasks
     reach_targets: tuple[Vector, ...]  # (3,) [m] in world, of the scenario's reach tasks
     step_targets: tuple[tuple[int, Vector], ...]  # side index, (2,) [m] in world, of the step tasks in order of time
     go_targets: tuple[Vector, ...]  # (2,) [m] in world, of the go tasks

@@ -18,6 +18,7 @@ from wbmpc.checks.hand_forces import (
     HandImpactCheck,
     HandsFreeAtEndCheck,
 )
+from wbmpc.checks.lift import ComDropCheck, ComInBandCheck, LiftedCheck
 from wbmpc.checks.momentum import MomentumBalanceCheck
 from wbmpc.checks.posture import ComHeightCheck, CompletedCheck, NoFallCheck, UprightAtEndCheck, WithdrawnCheck
 from wbmpc.checks.push import PushRecoveryCheck
@@ -64,6 +65,9 @@ CHECKS: dict[str, Any] = {  # kind -> class; a class takes its own settings mode
     "both_hands": BothHandsCheck,
     "hand_impact": HandImpactCheck,
     "hand_force_caps": HandForceCapsCheck,
+    "lifted": LiftedCheck,
+    "com_drop": ComDropCheck,
+    "com_in_band": ComInBandCheck,
     "hands_free_at_end": HandsFreeAtEndCheck,
 }
 

@@ -8,16 +8,17 @@ from wbmpc.planner.settings import HeightSettings
 from wbmpc.signals import Vector
 
 
-def height_band(settings: HeightSettings, references: Vector, plane: float) -> Vector:
+def height_band(settings: HeightSettings, references: Vector, distance: Vector, plane: float) -> Vector:
     """Admissible band (N, 2) of the CoM height [m]: the legs' range, narrowed by |c_z − r_z| ≤ d of the hands.
 
     Args:
         references: (ends, N, 3) their references, nan for a free one ([M] eq. QP1).
+        distance: (ends,) d of each [m].
         plane: height of the feet [m].
     """
     z = references[:, :, 2]
-    low = np.fmax.reduce(z - settings.reach, axis=0)
-    high = np.fmin.reduce(z + settings.reach, axis=0)
+    low = np.fmax.reduce(z - distance[:, None], axis=0)
+    high = np.fmin.reduce(z + distance[:, None], axis=0)
     low, high = np.fmax(low, plane + settings.lowest), np.fmin(high, plane + settings.highest)
     return np.column_stack([low, high])
 

@@ -29,7 +29,7 @@ from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
-from wbmpc.scenario import Obstacle, PatchPose, Task
+from wbmpc.scenario import Load, Obstacle, PatchPose, Task
 from wbmpc.signals import CandidateReport, HandMode, PlanReport, RobotState, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
@@ -56,6 +56,7 @@ class Planner:
         tasks: tuple[Task, ...],
         patches: tuple[PatchPose, ...],
         obstacles: tuple[Obstacle, ...] = (),
+        loads: tuple[Load, ...] = (),
         q: Vector,
         period: float,
     ) -> None:
@@ -79,7 +80,14 @@ class Planner:
             robot, settings, patches, keep_out=self._keep_out, nominal=q, times=times, period=period
         )
         self._references = References(
-            robot, tasks, q=q, palms=measured.palms, height=float(measured.com[2]), times=times
+            robot,
+            tasks,
+            loads,
+            q=q,
+            palms=measured.palms,
+            heading=float(measured.sole_yaws.mean()),
+            height=float(measured.com[2]),
+            times=times,
         )
         self._joints = JointReference(robot, settings.whole_body, q=q)
         self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
@@ -103,7 +111,7 @@ class Planner:
         gated, sigma = references.palms(state.time, contacts)
         foot, gated_foot = self._gait.shares(preview.times, 1.0), self._gait.shares(preview.times, self._gate)
         begin = perf_counter()
-        band = height_band(settings.height, gated, plane)
+        band = height_band(settings.height, gated, references.height_distance(settings.height.reach), plane)
         wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)) - self._gait.crouch
         height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
         stage1 = stage_report(solution, begin)
@@ -134,7 +142,11 @@ class Planner:
                 urgency=1.0 + self._haste * (settings.whole_body.alarm_urgency - 1.0),
             )
 
-        model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
+        carried = references.carried(preview.times)
+        if carried.any():
+            model = loaded_model(preview, height, forces=carried, points=list(gated), plane=plane, mass=mass)
+        else:
+            model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
         delta_z = np.zeros((preview.steps, 2))
         candidates: tuple[CandidateReport, ...] = ()
         stage3 = NOT_RUN
@@ -144,7 +156,13 @@ class Planner:
             if wish is not None:
                 delta_z = wish.delta_z
                 candidates, stage3 = contacts.plan(
-                    need_of(wish, height, model, polygons=judged.polygons, mass=mass, exact=exact),
+                    need_of(
+                        *(wish, height, model),
+                        carried=carried[:, :, 2].sum(axis=0),
+                        polygons=judged.polygons,
+                        mass=mass,
+                        exact=exact,
+                    ),
                     goal=self._goal_need(mass),
                     binding=stride is not None,
                     palms=self._measured.palms,
@@ -153,8 +171,8 @@ class Planner:
                     spent=references.spent(contacts),
                     events=events,
                 )
-        forces = contacts.forces
-        if forces.any():
+        forces = contacts.forces + carried
+        if contacts.forces.any():  # hands that brace carry nothing: either force is all there is
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
         com_band = references.com_band(contacts, gated, sigma, gated_foot)
         motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
@@ -185,6 +203,11 @@ class Planner:
         if motion is None and self._last is not None:
             self._last = replace(self._last, report=report)
             return self._last
+        arm_keep_out = self._keep_out.of_arms(
+            *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
+        )
+        if references.lifting is not None:
+            references.lifting.guard(arm_keep_out)
         self._last = assemble(
             report,
             step=preview.step,
@@ -196,9 +219,7 @@ class Planner:
             soles=soles,
             modes=[mode for _, _, mode in hands],
             contacts=contacts.hands,
-            arm_keep_out=self._keep_out.of_arms(
-                *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
-            ),
+            arm_keep_out=arm_keep_out,
         )
         return self._last
 
@@ -234,7 +255,14 @@ class Planner:
             events=events,
         )
         references.advance(
-            state.time, dt, gate_open=gate_open, palms=self._measured.palms, com=self._measured.com, events=events
+            state.time,
+            dt,
+            gate_open=gate_open,
+            palms=self._measured.palms,
+            palm_forces=state.palm_force_in_world,
+            homes=self._measured.palm_homes,
+            com=self._measured.com,
+            events=events,
         )
         contacts.advance(
             dt,

@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.robot import Robot
-from wbmpc.rotations import heading_of, level_frame, rotation_error
+from wbmpc.rotations import cross, heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
 
 SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 2e-3
@@ -19,6 +19,7 @@ STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 PATIENCE = 60  # iterations for the same targets; what has not converged by then is out of reach
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
 SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets are in reach
+UP = np.array([0.0, 0.0, 1.0])
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
@@ -39,9 +40,10 @@ class Posture:
     started from the last, keep it current while targets move.
     """
 
-    def __init__(self, robot: Robot, *, nominal: Vector, com_cost: float) -> None:
+    def __init__(self, robot: Robot, *, nominal: Vector, com_cost: float, tilt_cost: float = 0.0) -> None:
         """`nominal` (nq,): posture to deviate from as little as possible, and the start; `com_cost`: w [cost / m²]."""
         self._robot, self._nominal, self._com_cost = robot, nominal, com_cost
+        self._tilt_cost = tilt_cost
         self._kinematics = Kinematics(robot)
         self._kinematics.update_kinematics(nominal)
         self._height = float(self._kinematics.com[2])
@@ -129,6 +131,8 @@ class Posture:
             J = kinematics.com_jacobian[2]
             H += HEIGHT_COST * np.outer(J, J)
             g += HEIGHT_COST * (self._height - self.com[2]) * J
+            if self._tilt_cost:
+                self._add_tilt(H, g)
             diagonal = H.reshape(-1)[:: nv + 1]
             diagonal[6:] += POSTURE_COST
             g[6:] += POSTURE_COST * (self._nominal[7:] - self.q[7:])
@@ -154,6 +158,14 @@ class Posture:
         q[:2] = soles[:, :2].mean(axis=0) + turn[:2, :2] @ self._base_offset
         q[3:7] = (pin.Quaternion(turn) * pin.Quaternion(q[3:7])).coeffs()
         return q
+
+    def _add_tilt(self, H: Vector, g: Vector) -> None:
+        """Add  w_t |angle of the torso's axis to the vertical|²  to the normal equations."""
+        frame = self._robot.torso_frame
+        J = self._kinematics.jacobian(frame)[3:5]
+        error = cross(self._kinematics.rotation(frame)[:, 2], UP)[:2]
+        H += self._tilt_cost * (J.T @ J)
+        g += self._tilt_cost * (J.T @ error)
 
     def _add_palms(self, palms: list[PalmTarget | None], H: Vector, g: Vector) -> None:
         """Add the palms' and elbows' terms to the normal equations  H (nv, nv), g (nv,)."""

@@ -7,13 +7,14 @@ import numpy as np
 from wbmpc.planner.bands import horizontal_band
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.lean import Lean
+from wbmpc.planner.lift import Lift
 from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
 from wbmpc.planner.stride import Stride
 from wbmpc.robot import Robot
 from wbmpc.rotations import angle_difference
-from wbmpc.scenario import ComHeightTask, LeanTask, ReachTask, Task
+from wbmpc.scenario import ComHeightTask, LeanTask, Load, ReachTask, Task
 from wbmpc.signals import SIDES, HandMode, Vector
 
 REACH_FLOOR, FOOT_FLOOR = 0.12, 0.05  # [m] smallest d of hand and foot: neither pins the CoM to itself
@@ -21,6 +22,9 @@ UNBOUNDED = 0.3  # [m] d of a hand without a reference
 SPENT = 0.02  # [m] palm error of a posture from which a contact does not reach
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
+LIFT_COM_COST = 10.0  # [cost / m²] how hard a lift's posture keeps its CoM over the feet
+LIFT_TILT_COST = 0.03  # [cost / rad²] how hard a lift's posture keeps the torso up: knees bend, not the back
+LIFT_SLACK = 0.01  # [m] of d of the hands that lift
 LEAN_BAND = 0.001  # [m] d of the CoM from a lean's way
 SHRINK_RATE, SHRINK_LIMIT = 1.0, 0.02  # [1/s], [m] how a held hand that stays short tightens its d
 
@@ -33,9 +37,21 @@ class References:
     """
 
     def __init__(
-        self, robot: Robot, tasks: tuple[Task, ...], *, q: Vector, palms: Vector, height: float, times: Vector
+        self,
+        robot: Robot,
+        tasks: tuple[Task, ...],
+        loads: tuple[Load, ...],
+        *,
+        q: Vector,
+        palms: Vector,
+        heading: float,
+        height: float,
+        times: Vector,
     ) -> None:
-        """Start with palms at `palms` (2, 3) [m] and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
+        """Start with palms at `palms` (2, 3) [m], the feet's `heading` [rad] and the CoM at `height` [m].
+
+        `times` (N,) are the knots [s].
+        """
         self._times, self._nominal_height = times, height
         self.reaches = [
             Reach(task, side=_hand_of(task, palms), palm=palms[_hand_of(task, palms)])
@@ -43,6 +59,11 @@ class References:
             if isinstance(task, ReachTask)
         ]
         self.leans = [Lean(task) for task in tasks if isinstance(task, LeanTask)]
+        lifts = [Lift(load, palms=palms, heading=heading, palm_radius=robot.palm_radius) for load in loads]
+        self.lift = lifts[0] if lifts else None
+        self._low, self._high = (  # the palms on the box, and at the top
+            Posture(robot, nominal=q, com_cost=LIFT_COM_COST, tilt_cost=LIFT_TILT_COST) for _ in range(2)
+        )
         self._tasks: list[Reach | Lean] = [*self.reaches, *self.leans]
         self._heights = [task for task in tasks if isinstance(task, ComHeightTask)]
         self._stand = Posture(robot, nominal=q, com_cost=COM_COST)
@@ -55,9 +76,28 @@ class References:
     # ------------------------------------------------------------------ once a plan
 
     def advance(
-        self, time: float, dt: float, *, gate_open: bool, palms: Vector, com: Vector, events: list[str]
+        self,
+        time: float,
+        dt: float,
+        *,
+        gate_open: bool,
+        palms: Vector,
+        palm_forces: Vector,
+        homes: Vector,
+        com: Vector,
+        events: list[str],
     ) -> None:
-        """Every task one plan further; `palms` (2, 3) and `com` (3,) are measured [m]."""
+        """Every task one plan further.
+
+        Args:
+            palms, palm_forces: measured (2, 3) [m], [N]; `homes` (2, 3) [m]: where free palms hang.
+            com: measured (3,) [m].
+        """
+        if self.lift is not None:
+            phase = self.lift.phase
+            self.lift.advance(time, dt, palms=palms, palm_forces=palm_forces, homes=homes)
+            if self.lift.phase != phase:
+                events.append(f"lift: {phase.name.lower()} -> {self.lift.phase.name.lower()}")
         for task in self._tasks:
             before = task.progress.phase
             if isinstance(task, Reach):
@@ -93,6 +133,10 @@ class References:
         self._stand.iterate(iterations, soles=soles, yaws=yaws, palms=[None, None], centre=centre)
         if stride is not None:
             soles, yaws = stride.after.positions, stride.after.yaws
+        if self.lift is not None and self.lift.ahead:
+            for posture, ends in ((self._low, self.lift.grasp), (self._high, self.lift.top)):
+                held = [PalmTarget(end, normal) for end, normal in zip(ends, self.lift.normals, strict=True)]
+                posture.iterate(iterations, soles=soles, yaws=yaws, palms=held, centre=centre)
         palms: list[PalmTarget | None] = [c.target for c in contacts.hands]
         for task in self._current:
             if isinstance(task, Lean):
@@ -118,7 +162,14 @@ class References:
         return next((task for task in self._current if isinstance(task, Lean)), None)
 
     @property
+    def lifting(self) -> Lift | None:
+        """The lift that moves the hands now, if one does."""
+        return self.lift if self.lift is not None and self.lift.active else None
+
+    @property
     def _goal(self) -> Posture:
+        if self.lifting is not None:
+            return self._high if self.lifting.raised else self._low
         return self._lean_goal if self._leaning is not None else self._reach_goal
 
     # ------------------------------------------------------------------ over the horizon
@@ -141,6 +192,9 @@ class References:
             sigma = np.maximum(sigma, sigmas)
             if isinstance(task, Reach):
                 references[task.side] = task.preview(sigmas)
+        if self.lifting is not None:
+            references[:] = self.lifting.preview(times)
+            sigma = np.maximum(sigma, self.lifting.sigmas(times))
         return references, sigma
 
     def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector, foot: Vector) -> Vector:
@@ -170,7 +224,7 @@ class References:
         """
         base = self._base(contacts).com[2]
         wanted = np.full(len(self._times), base)
-        if self._current or self._stride is not None:
+        if self._current or self._stride is not None or self.lifting is not None:
             wanted += sigma * (self._goal.com[2] - base)
         for task in self._heights:
             knots = [0.0] + [w.time for w in task.waypoints]
@@ -179,7 +233,9 @@ class References:
         return wanted
 
     def _base(self, contacts: Contacts) -> Posture:
-        """What the robot does without a task: stand, or brace."""
+        """What the robot does without a task: stand, or brace; from where it goes on: hold what it lifts."""
+        if self.lifting is not None and self.lifting.raised:
+            return self._low
         return contacts.posture if contacts.posture is not None else self._stand
 
     def _foot_distance(self, contacts: Contacts, share: Vector) -> Vector:
@@ -205,7 +261,24 @@ class References:
         for task in self._current:
             if isinstance(task, Reach):
                 distance[task.side] = np.abs(task.target[:2] - self._goal.com[:2]) - self._shrink
+        if self.lifting is not None:
+            distance[:] = self._lift_distance[:, :2] + LIFT_SLACK
         return np.maximum(distance, REACH_FLOOR)
+
+    def carried(self, times: Vector) -> Vector:
+        """Forces (2, n, 3) [N] on the palms of what they hold, in world, `times` (n,) seconds from now."""
+        return np.zeros((len(SIDES), len(times), 3)) if self.lifting is None else self.lifting.forces(times)
+
+    def height_distance(self, usual: float) -> Vector:
+        """d (2,) of each hand [m] for the CoM height: `usual`, or what lies between the two in a lift's postures."""
+        return np.full(2, usual) if self.lifting is None else self._lift_distance[:, 2] + LIFT_SLACK
+
+    @property
+    def _lift_distance(self) -> Vector:
+        """(2, 3) [m] the larger distance of each palm from the CoM, with the box down or up."""
+        assert self.lift is not None
+        low, high = self.lift.grasp - self._low.com, self.lift.top - self._high.com
+        return np.maximum(np.abs(low), np.abs(high))
 
     # ------------------------------------------------------------------ now
 
@@ -222,6 +295,8 @@ class References:
     @property
     def _sigma(self) -> float:
         """Progress of the furthest task or the stride."""
+        if self.lifting is not None:
+            return self.lifting.sigma
         tasks = max((task.progress.sigma for task in self._current), default=0.0)
         return tasks if self._stride is None else max(tasks, self._stride.sigma)
 
@@ -240,7 +315,7 @@ class References:
     def hands_taken(self) -> list[bool]:
         """Which hands belong to a task (left, right), now or later."""
         taken = [task.side for task in self._current if isinstance(task, Reach)]
-        return [side in taken for side in range(len(SIDES))]
+        return [side in taken or (self.lift is not None and self.lift.ahead) for side in range(len(SIDES))]
 
     def hand_targets(self, contacts: Contacts, palms: Vector) -> list[tuple[Vector, Vector, HandMode]]:
         """Position (3,) [m], velocity (3,) [m/s] and mode of each hand; a free hand is where it is, `palms` (2, 3)."""
@@ -253,6 +328,8 @@ class References:
             for reach in self.reaches:
                 if reach.side == side and reach.progress.active:
                     target = (*reach.reference()[:2], HandMode.MOVE)
+            if self.lifting is not None:
+                target = (*self.lifting.reference(side), self.lifting.mode)
             targets.append(target)
         return targets
 

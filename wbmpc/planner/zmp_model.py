@@ -36,7 +36,7 @@ def loaded_model(
 
     Args:
         forces: (contacts, N, 3) on the robot, in world [N].
-        points: where each acts (3,), in world [m]; None for an unused one.
+        points: where each acts, (3,) or (N, 3), in world [m]; None for an unused one.
     """
     total = forces[:, :, 2].sum(axis=0)
     a, b = preview.zmp_gains(
@@ -46,7 +46,7 @@ def loaded_model(
     for force, point in zip(forces, points, strict=True):
         if point is not None:
             offset += preview.zmp_offset(
-                point=np.tile(point, (preview.steps, 1)),
+                point=np.broadcast_to(point, (preview.steps, 3)),
                 force=force,
                 vertical_acceleration=height.acceleration,
                 vertical_force=total,
@@ -73,11 +73,14 @@ def need_of(
     height: HeightPlan,
     model: ZmpModel,
     *,
+    carried: Vector,
     polygons: tuple[SupportPolygon, ...],
     mass: float,
     exact: bool,
 ) -> Need:
-    """What stage 3 must know of a plan `wish` whose ΔZ was free; `model` is the contact-free ZMP it was made with.
+    """What stage 3 must know of a plan `wish` whose ΔZ was free; `model` is the ZMP it was made with, of no new contact.
+
+    `carried` (N,) is the vertical force [N] of what the hands hold, already in that model.
 
     The paper's ΔZ has a term m c_z c̈ c̈_z / g even without a contact (docs/paper.md); the exact one has not.
     """
@@ -87,8 +90,8 @@ def need_of(
         phantom = mass * lever[:, None] * wish.acceleration / GRAVITY
     return Need(
         delta_z=wish.delta_z,
-        zmp=model.a[:, None] * wish.com - model.b[:, None] * wish.acceleration,
-        weight=mass * (GRAVITY + height.acceleration),
+        zmp=model.a[:, None] * wish.com - model.b[:, None] * wish.acceleration + model.offset,
+        weight=mass * (GRAVITY + height.acceleration) - carried,
         polygons=polygons,
         phantom=phantom,
     )

@@ -3,6 +3,7 @@
 from wbmpc.scenario.consistency import check_names
 from wbmpc.scenario.json_schema import scenario_json_schema
 from wbmpc.scenario.load import counterfactual, load_scenario, robot_path, vary
+from wbmpc.scenario.loads import Load, resolve_loads
 from wbmpc.scenario.obstacles import Obstacle, resolve_obstacles
 from wbmpc.scenario.overrides import apply_overrides, parse_overrides
 from wbmpc.scenario.patches import PatchPose, resolve_patches
@@ -16,6 +17,7 @@ from wbmpc.scenario.schema.tasks import (
     GoTask,
     HeightWaypoint,
     LeanTask,
+    LiftTask,
     ReachTask,
     StandTask,
     StepTask,
@@ -38,6 +40,8 @@ __all__ = [
     "Impulse",
     "InitialState",
     "LeanTask",
+    "LiftTask",
+    "Load",
     "LoopSettings",
     "Obstacle",
     "Patch",
@@ -61,6 +65,7 @@ __all__ = [
     "counterfactual",
     "load_scenario",
     "parse_overrides",
+    "resolve_loads",
     "resolve_obstacles",
     "resolve_patches",
     "robot_path",

@@ -18,7 +18,7 @@ from wbmpc.scenario.diagnosis import Finding
 from wbmpc.scenario.patches import FACES
 from wbmpc.scenario.robot_file import RobotNames
 from wbmpc.scenario.schema.scenario import Scenario
-from wbmpc.scenario.schema.tasks import GoTask, ReachTask, StepTask, Task
+from wbmpc.scenario.schema.tasks import GoTask, LiftTask, ReachTask, StepTask, Task
 from wbmpc.scenario.task_consistency import find_task_inconsistencies
 from wbmpc.scenario.wording import KeyPath, describe, near_misses
 
@@ -29,6 +29,7 @@ def find_inconsistencies(scenario: Scenario) -> list[Finding]:
     """Every contradiction between the fields of one scenario; counterfactuals and sweep are looked at elsewhere."""
     return [
         *_objects_and_patches(scenario),
+        *_lifted_objects(scenario),
         *_times(scenario),
         *find_task_inconsistencies(scenario),
         *_rates(scenario),
@@ -41,13 +42,16 @@ def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Findin
     yield from _must_exist(("initial", "keyframe"), scenario.initial.keyframe, robot.keyframes, "keyframe")
     for joint in scenario.initial.joints:
         yield from _must_exist(("initial", "joints", joint), joint, robot.joints, "joint", at_key=True)
+    movable = [name for name, box in scenario.world.objects.items() if box.mass is not None]
     for body in scenario.plant.body_mass_scale:
-        yield from _must_exist(("plant", "body_mass_scale", body), body, robot.bodies, "body", at_key=True)
+        yield from _must_exist(("plant", "body_mass_scale", body), body, [*robot.bodies, *movable], "body", at_key=True)
     for index, disturbance in enumerate(scenario.disturbances):
         yield from _must_exist(("disturbances", index, "body"), disturbance.body, robot.bodies, "body")
     for name in scenario.world.objects:
         if name in robot.geoms:
             yield Finding(("world", "objects", name), "the robot has a geom of this name", at_key=True)
+        elif name in movable and name in robot.bodies:
+            yield Finding(("world", "objects", name), "the robot has a body of this name", at_key=True)
 
 
 def check_names(scenario: Scenario) -> tuple[str, ...]:
@@ -79,6 +83,21 @@ def _objects_and_patches(scenario: Scenario) -> Iterator[Finding]:
                     (*path, "offset", component),
                     f"off the face: {patch.offset[component]:g} m from the centre, the face ends at {half:g} m",
                 )
+
+
+def _lifted_objects(scenario: Scenario) -> Iterator[Finding]:
+    objects = scenario.world.objects
+    for index, task in enumerate(scenario.tasks):
+        if not isinstance(task, LiftTask):
+            continue
+        path: KeyPath = ("tasks", index, "object")
+        if task.object not in objects:
+            yield from _must_exist(path, task.object, objects, "object")
+        elif objects[task.object].mass is None:
+            yield Finding(path, f"'{task.object}' is fixed, give it a mass (world.objects.{task.object}.mass)")
+    for name, patch in scenario.patches.items():
+        if patch.on in objects and objects[patch.on].mass is not None:
+            yield Finding(("patches", name, "on"), f"'{patch.on}' has a mass, it gives way: no hand can brace on it")
 
 
 def _times(scenario: Scenario) -> Iterator[Finding]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wbmpc.scenario.schema.scenario import Scenario
+from wbmpc.scenario.schema.tasks import LiftTask
 from wbmpc.signals import Vector
 
 
@@ -23,7 +24,8 @@ class Obstacle:
 
 
 def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
-    """All boxes of a scenario that are not walkable, whether or not they are present, in the order of the file."""
+    """Boxes that are neither walkable nor to be lifted, whether or not they are present, in the order of the file."""
+    lifted = {task.object for task in scenario.tasks if isinstance(task, LiftTask)}
     return tuple(
         Obstacle(
             centre=np.array(box.centre),
@@ -33,8 +35,8 @@ def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
             bottom=box.bottom,
             top=box.bottom + box.size[2],
         )
-        for box in scenario.world.objects.values()
-        if not box.walkable
+        for name, box in scenario.world.objects.items()
+        if not box.walkable and name not in lifted
     )
 
 

@@ -14,6 +14,7 @@ from wbmpc.scenario.schema.tasks import (
     FootworkTask,
     GoTask,
     LeanTask,
+    LiftTask,
     Task,
     WalkTask,
 )
@@ -32,6 +33,7 @@ def find_task_inconsistencies(scenario: Scenario) -> Iterator[Finding]:
         yield Finding(("tasks", heights[1]), f"a second com_height task, first is tasks.{heights[0]}")
     yield from _footwork(scenario.tasks)
     yield from _leans(scenario.tasks)
+    yield from _lifts(scenario.tasks)
 
 
 def _inside_one_task(path: KeyPath, task: Task) -> Iterator[Finding]:
@@ -61,6 +63,17 @@ def _leans(tasks: Iterable[Task]) -> Iterator[Finding]:
     for (first, before), (index, task) in itertools.combinations(busy, 2):
         if task.start < before.end and LeanTask in (type(before), type(task)):
             message = f"begins at {task.start:g} s, but tasks.{first} ({before.kind}) lasts until {before.end:g} s"
+            yield Finding(("tasks", index), message)
+
+
+def _lifts(tasks: Iterable[Task]) -> Iterator[Finding]:
+    """A lift takes both hands and never lets go: nothing that moves hands or CoM comes at the same time or after it."""
+    lifts = [(index, task) for index, task in enumerate(tasks) if isinstance(task, LiftTask)]
+    for index, _ in lifts[1:]:
+        yield Finding(("tasks", index), f"a second lift task, first is tasks.{lifts[0][0]}")
+    for (first, lift), (index, task) in itertools.product(lifts[:1], enumerate(tasks)):
+        if isinstance(task, ExcursionTask) and task.end > lift.start:
+            message = f"ends at {task.end:g} s, but tasks.{first} (lift) takes both hands from {lift.start:g} s on"
             yield Finding(("tasks", index), message)
 
 

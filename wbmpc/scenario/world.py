@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -107,24 +108,33 @@ def _add_floor(spec: mujoco.MjSpec, scenario: Scenario) -> None:
 
 
 def _add_objects(spec: mujoco.MjSpec, scenario: Scenario) -> None:
+    """Fixed boxes as geoms of the world, those with a mass as free bodies after the robot."""
     for name, box in scenario.world.objects.items():
-        if box.present:
-            _add_geom(
-                spec,
-                scenario,
-                friction=box.friction,
-                name=name,
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                size=np.array(box.size) / 2,
-                pos=box.centre,
-                quat=[math.cos(box.yaw / 2), 0, 0, math.sin(box.yaw / 2)],
-                rgba=box.color,
-            )
+        if not box.present:
+            continue
+        pose = {"pos": list(box.centre), "quat": [math.cos(box.yaw / 2), 0, 0, math.sin(box.yaw / 2)]}
+        body, placed = None, pose
+        if box.mass is not None:
+            body, placed = spec.worldbody.add_body(name=name, **pose), {"mass": box.mass}
+            body.add_freejoint(name=f"{name}_free")
+            for key in spec.keys:
+                key.qpos = [*key.qpos, *pose["pos"], *pose["quat"]]
+        _add_geom(
+            spec,
+            scenario,
+            body=body,
+            friction=box.friction,
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=np.array(box.size) / 2,
+            rgba=box.color,
+            **placed,
+        )
 
 
-def _add_geom(spec: mujoco.MjSpec, scenario: Scenario, *, friction: float, **attributes: object) -> None:
+def _add_geom(spec: mujoco.MjSpec, scenario: Scenario, *, friction: float, body: Any = None, **attributes: Any) -> None:
     true_friction = friction if scenario.plant.friction is None else scenario.plant.friction
-    spec.worldbody.add_geom(
+    (body or spec.worldbody).add_geom(
         priority=1,
         friction=[true_friction, TORSIONAL_FRICTION, ROLLING_FRICTION],
         condim=CONTACT_DIMENSION,
@@ -138,10 +148,12 @@ def _add_geom(spec: mujoco.MjSpec, scenario: Scenario, *, friction: float, **att
 
 def _scale_masses(model: mujoco.MjModel, scenario: Scenario) -> None:
     """Scale compiled inertias, so that it does not matter how the robot's file declares them."""
-    scale = np.full(model.nbody, scenario.plant.mass_scale)
+    robot = model.body_rootid == model.jnt_bodyid[0]  # joint 0 is the robot's free joint
+    scale = np.where(robot, scenario.plant.mass_scale, 1.0)
     for name, factor in scenario.plant.body_mass_scale.items():
         body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-        scale[body] *= factor
+        if body >= 0:  # an object that is not present has none
+            scale[body] *= factor
     if np.all(scale == 1.0):
         return
     model.body_mass *= scale

@@ -42,6 +42,7 @@ class TrackerSettings(StrictModel):
     hand_integral: float = Field(60.0, ge=0, description="[1/s³] removes the steady error of a hand")
     hand_integral_limit: float = Field(3.0, ge=0, description="[m/s²] bound on the integral's share")
     braced_weight: float = Field(200.0, gt=0, description="of a palm in contact that should stay where it is")
+    carry_weight: float = Field(50.0, gt=0, description="of a palm that holds a thing together with the other one")
     posture_stiffness: float = Field(60.0, ge=0, description="[1/s²]")
     posture_damping: float = Field(12.0, ge=0, description="[1/s]")
     posture_weight: float = Field(0.02, gt=0)

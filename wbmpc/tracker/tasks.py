@@ -12,7 +12,7 @@ from wbmpc.tracker.settings import TrackerSettings
 
 COM, MOMENTUM, TORSO, FEET, HANDS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 21), slice(21, 27)
 TASK_ROWS = 27
-FREE, CONTACT = int(HandMode.FREE), int(HandMode.CONTACT)  # plain numbers: enum look-ups cost microseconds
+FREE, CONTACT, CARRY = (int(mode) for mode in (HandMode.FREE, HandMode.CONTACT, HandMode.CARRY))  # plain numbers: enum look-ups cost microseconds
 
 
 class TaskStack:
@@ -119,6 +119,9 @@ class TaskStack:
             self.target[rows] = -s.stance_damping * velocity - kinematics.drift(frame)[:3]
             self._hand_integral[side] = 0.0
             return
+        if mode == CARRY:
+            self._carry(kinematics, setpoint, side, velocity)
+            return
         urgency = float(setpoint.hand_urgency[side])
         self.weight[rows] = s.hand_weight + urgency * (s.urgent_hand_weight - s.hand_weight)
         limit = s.hand_acceleration_limit
@@ -135,3 +138,18 @@ class TaskStack:
         if norm > limit:
             wanted *= limit / norm
         self.target[rows] = setpoint.hand_acceleration[side] + wanted - kinematics.drift(frame)[:3]
+
+    def _carry(self, kinematics: Kinematics, setpoint: Setpoint, side: int, velocity: Vector) -> None:
+        """Both palms follow their paths, but for how far they are apart: that is the held thing's to say."""
+        s, frames = self._settings, self._robot.palm_frames
+        rows = slice(HANDS.start + 3 * side, HANDS.start + 3 * side + 3)
+        palms = [kinematics.position(frame) for frame in frames]
+        across = palms[0] - palms[1]
+        across /= np.sqrt(across @ across)
+        errors = [setpoint.hand_position[i] - palms[i] for i in range(2)]
+        apart = 0.5 * float((errors[0] - errors[1]) @ across)
+        error = errors[side] - (apart if side == 0 else -apart) * across
+        self.weight[rows] = s.carry_weight
+        self.target[rows] = s.hand_stiffness * error + s.hand_damping * (setpoint.hand_velocity[side] - velocity)
+        self.target[rows] += setpoint.hand_acceleration[side] - kinematics.drift(frames[side])[:3]
+        self._hand_integral[side] = 0.0

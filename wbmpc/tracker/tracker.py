@@ -24,7 +24,7 @@ from wbmpc.tracker.constraints import (
 )
 from wbmpc.tracker.reflex import TouchReflex
 from wbmpc.tracker.settings import TrackerSettings
-from wbmpc.tracker.tasks import CONTACT, TaskStack
+from wbmpc.tracker.tasks import CARRY, CONTACT, TaskStack
 
 FORCES = 18  # two sole wrenches (6 each), then two palm forces (3 each), each in its contact's own frame
 SENSED_SHARE = 0.2  # per tick, of the filtered palm force
@@ -171,6 +171,14 @@ class Tracker:
                 lower[sole], upper[sole] = -np.inf, np.inf
                 lower[6 * side + 2] = 0.0
             palm = slice(12 + 3 * side, 15 + 3 * side)
+            if int(setpoint.hand_mode[side]) == CARRY:  # the held thing's force is known
+                self._contact_rotation[2 + side] = np.eye(3)
+                self._contact_jacobian[palm] = self._tasks.matrix[21 + 3 * side : 24 + 3 * side]
+                lower[palm] = upper[palm] = setpoint.hand_force[side]
+                first = self._palm_rows.start + side * PALM_ROWS
+                qp.matrix[first : first + PALM_ROWS, nj + 12 + 3 * side : nj + 15 + 3 * side] = 0.0
+                self._sensed[side] = 0.0
+                continue
             if int(setpoint.hand_mode[side]) != CONTACT:
                 self._contact_jacobian[palm] = 0.0
                 self._sensed[side] = 0.0

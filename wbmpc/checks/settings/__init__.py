@@ -21,6 +21,7 @@ from wbmpc.checks.settings.hands import (
     Reach,
     Withdrawn,
 )
+from wbmpc.checks.settings.lift import ComDrop, ComInBand, Lifted
 from wbmpc.checks.settings.motion import (
     Arrived,
     ComBeyondToes,
@@ -58,6 +59,9 @@ ScenarioCheck = Annotated[
     | Footsteps
     | Travelled
     | Arrived
+    | Lifted
+    | ComDrop
+    | ComInBand
     | FootMoved
     | ComOutsideStance
     | ContactSequence
@@ -74,7 +78,9 @@ __all__ = [
     "BraceForce",
     "CheckSettings",
     "ComBeyondToes",
+    "ComDrop",
     "ComHeight",
+    "ComInBand",
     "ComOutsideStance",
     "Completed",
     "ContactPatches",
@@ -86,6 +92,7 @@ __all__ = [
     "HandImpact",
     "HandsFreeAtEnd",
     "HoldSettings",
+    "Lifted",
     "MomentumBalance",
     "NoFall",
     "Penetration",

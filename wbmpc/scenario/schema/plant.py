@@ -34,9 +34,9 @@ Disturbance = Impulse
 class PlantSettings(StrictModel):
     """How the simulated robot and world differ from what the controller believes."""
 
-    mass_scale: MassScale = Field(default=1.0, description="Factor on every body's mass and inertia [-].")
+    mass_scale: MassScale = Field(default=1.0, description="Factor on mass and inertia of all the robot's bodies [-].")
     body_mass_scale: dict[str, MassScale] = Field(
-        default={}, description="Further factors on the mass and inertia of single bodies, by body name [-]."
+        default={}, description="Further factors on mass and inertia, by name of the robot's body or of an object that has a mass [-]."
     )
     friction: Friction | None = Field(
         default=None, description="True friction coefficient of floor and objects [-]; null: as declared in `world`."

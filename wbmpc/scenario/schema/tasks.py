@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from wbmpc.strict import NonNegative, Positive, StrictModel, Vector2, Vector3
+from wbmpc.strict import Friction, NonNegative, Positive, StrictModel, Vector2, Vector3
 
 MAX_WALKING_SPEED = 0.3  # [m/s]
 
@@ -147,8 +147,26 @@ class GoTask(StrictModel):
         return self.start + self.swing_time
 
 
+class LiftTask(StrictModel):
+    """Take a box between both palms, by friction alone, and lift it straight up; it is carried until the run ends."""
+
+    kind: Literal["lift"] = Field(description="Lift a box with both hands.")
+    object: str = Field(min_length=1, description="Name of the object, which must have a mass.")
+    height: Annotated[float, Field(gt=0, le=0.5)] = Field(description="How far up [m].")
+    start: NonNegative = Field(default=0.5, description="When the hands set out [s].")
+    reach_time: Positive = Field(default=2.5, description="How long the hands' way to the box takes [s].")
+    raise_time: Positive = Field(default=2.5, description="How long the way up takes [s].")
+    friction: Friction = Field(default=0.4, description="Friction coefficient that the grip counts on [-].")
+
+    @property
+    def end(self) -> float:
+        """When the box can be up [s] at the earliest."""
+        return self.start + self.reach_time + self.raise_time
+
+
 FootworkTask = WalkTask | StepTask | GoTask  # the tasks that move the feet
 
 Task = Annotated[
-    StandTask | ComHeightTask | ReachTask | LeanTask | WalkTask | StepTask | GoTask, Field(discriminator="kind")
+    StandTask | ComHeightTask | ReachTask | LeanTask | WalkTask | StepTask | GoTask | LiftTask,
+    Field(discriminator="kind")
 ]

@@ -19,9 +19,9 @@ class Floor(StrictModel):
 
 
 class Box(StrictModel):
-    """A fixed box. It is placed by its underside, so that changing `size.2` alone makes a table higher."""
+    """A box, fixed or free. It is placed by its underside, so that changing `size.2` alone makes a table higher."""
 
-    kind: Literal["box"] = Field(description="A fixed box: table, wall, step.")
+    kind: Literal["box"] = Field(description="A box: table, wall, step, or with a mass a thing to carry.")
     size: tuple[Positive, Positive, Positive] = Field(description="Edge lengths along the box's own x, y, z [m].")
     position: Vector2 = Field(description="Centre of the box in the horizontal plane: world x, y [m].")
     bottom: NonNegative = Field(default=0.0, description="Height of the underside above the floor [m].")
@@ -29,6 +29,9 @@ class Box(StrictModel):
     friction: Friction = Field(default=0.8, description="Coulomb friction coefficient [-].")
     walkable: bool = Field(
         default=False, description="Whether the robot may stand on it: elsewhere a foot may touch the floor only."
+    )
+    mass: Positive | None = Field(
+        default=None, description="Mass of a box that may be moved, as the controller is told [kg]; null: it is fixed."
     )
     color: Colour = Field(default=(0.72, 0.53, 0.35, 1.0), description="Red, green, blue, opacity, each 0 to 1 [-].")
     present: bool = Field(
