@@ -31,7 +31,7 @@ class Plant:
         qpos: Vector,
         seed: int,
     ) -> None:
-        """Place robot and free objects at `qpos` (nq,) at rest, the robot's part first; `seed` fixes all sensor noise."""
+        """Place robot, then free objects at `qpos` (nq,), at rest; `seed` fixes all sensor noise."""
         self.model, self._robot, self._sensors = model, robot, sensors
         self.data = mujoco.MjData(model)
         self._step = model.opt.timestep

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbmpc.checks import settings
 from wbmpc.checks.context import TOUCH, CheckContext, LiftedObject
@@ -49,7 +50,7 @@ def _lowest_and_tilt(thing: LiftedObject, qpos: Vector) -> tuple[Vector, Vector]
     return lowest, np.arccos(np.clip(third_row[:, 2], -1.0, 1.0))
 
 
-def _held_by_palms_alone(context: CheckContext, thing: LiftedObject) -> Vector:
+def _held_by_palms_alone(context: CheckContext, thing: LiftedObject) -> NDArray[np.bool_]:
     """(n,) whether both palms touch the object, and nothing else does."""
     facts, recorder = context.facts, context.recorder
     geoms = recorder.contacts.geoms

@@ -46,7 +46,7 @@ class Lift:
     """
 
     def __init__(self, load: Load, *, palms: Vector, heading: float, palm_radius: float) -> None:
-        """`palms` (2, 3) are where the hands hang [m]; the robot's `heading` [rad] says which faces are left and right."""
+        """`palms` (2, 3) are where the hands hang [m]; the robot's `heading` [rad] says which face is left."""
         self.task, self.phase, self.mass = load.task, LiftPhase.WAIT, load.mass
         frame = level_frame(load.yaw)
         left = level_frame(heading)[:, 1]
@@ -126,7 +126,7 @@ class Lift:
         return np.array([path.positions(self.sigmas(times)) for path in self._paths])
 
     def forces(self, times: Vector) -> Vector:
-        """Forces (2, n, 3) [N] of the box on the palms, in world, `times` (n,) seconds from now; 0 when none is held."""
+        """Forces (2, n, 3) [N] of the box on the palms, in world, `times` (n,) seconds from now; 0 when not held."""
         forces = np.zeros((2, len(times), 3))
         if self.holds:
             clock = times + (self._clock if self.phase == LiftPhase.GRIP else 2.0 * RAMP)

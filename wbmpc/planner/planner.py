@@ -11,12 +11,12 @@ from wbmpc.planner.assembly import assemble, stage_report
 from wbmpc.planner.bands import height_band
 from wbmpc.planner.com_height import ComHeightStage
 from wbmpc.planner.com_state import ComState
-from wbmpc.planner.contact_force import Need
-from wbmpc.planner.contacts import NOT_RUN, Contacts
+from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet
 from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.joint_reference import JointReference
+from wbmpc.planner.judge import Judge
 from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.plan import Plan, com_course
 from wbmpc.planner.preview import Preview
@@ -25,12 +25,13 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.snapshot import Snapshot
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
+from wbmpc.planner.tasks import Tasks
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
-from wbmpc.planner.zmp_model import free_model, loaded_model, need_at_rest, need_of
+from wbmpc.planner.zmp_model import free_model, loaded_model
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.scenario import Load, Obstacle, PatchPose, Task
-from wbmpc.signals import CandidateReport, HandMode, PlanReport, RobotState, Vector
+from wbmpc.signals import HandMode, PlanReport, RobotState, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
 FIRST_ITERATIONS = 80  # of every posture, before the first plan
@@ -79,15 +80,10 @@ class Planner:
         self._contacts = Contacts(
             robot, settings, patches, keep_out=self._keep_out, nominal=q, times=times, period=period
         )
-        self._references = References(
-            robot,
-            tasks,
-            loads,
-            q=q,
-            palms=measured.palms,
-            heading=float(measured.sole_yaws.mean()),
-            height=float(measured.com[2]),
-            times=times,
+        self._tasks = Tasks(robot, tasks, loads, palms=measured.palms, heading=float(measured.sole_yaws.mean()))
+        self._references = References(robot, self._tasks, q=q, height=float(measured.com[2]), times=times)
+        self._judge = Judge(
+            settings, gait=self._gait, references=self._references, contacts=self._contacts, tasks=self._tasks
         )
         self._joints = JointReference(robot, settings.whole_body, q=q)
         self._improve_postures(iterations=FIRST_ITERATIONS, everyone=True)
@@ -104,15 +100,13 @@ class Planner:
         judged, gated_support = self._supports(state.time)
         polygon = gated_support.polygons[0]
         plane = polygon.plane_height
-        mass, exact = state.mass_scale * self._robot.mass, settings.formulation == "exact"
+        mass = state.mass_scale * self._robot.mass
 
-        stride = self._gait.stride
-        full_pace, full_sigma = references.palms(state.time, None, pace=1.0)
         gated, sigma = references.palms(state.time, contacts)
-        foot, gated_foot = self._gait.shares(preview.times, 1.0), self._gait.shares(preview.times, self._gate)
+        foot = self._gait.shares(preview.times, self._gate)
         begin = perf_counter()
         band = height_band(settings.height, gated, references.height_distance(settings.height.reach), plane)
-        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, gated_foot)) - self._gait.crouch
+        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, foot)) - self._gait.crouch
         height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
         stage1 = stage_report(solution, begin)
 
@@ -143,38 +137,25 @@ class Planner:
             )
 
         carried = references.carried(preview.times)
+        exact = settings.formulation == "exact"
+        model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
         if carried.any():
             model = loaded_model(preview, height, forces=carried, points=list(gated), plane=plane, mass=mass)
-        else:
-            model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
-        delta_z = np.zeros((preview.steps, 2))
-        candidates: tuple[CandidateReport, ...] = ()
-        stage3 = NOT_RUN
-        if settings.contact_stage:
-            full_band = references.com_band(contacts, full_pace, full_sigma, foot)
-            wish, _ = stage_2(self._need_stage, self._com.anticipated, model, judged, full_band)
-            if wish is not None:
-                delta_z = wish.delta_z
-                candidates, stage3 = contacts.plan(
-                    need_of(
-                        *(wish, height, model),
-                        carried=carried[:, :, 2].sum(axis=0),
-                        polygons=judged.polygons,
-                        mass=mass,
-                        exact=exact,
-                    ),
-                    goal=self._goal_need(mass),
-                    binding=stride is not None,
-                    palms=self._measured.palms,
-                    hand_taken=references.hands_taken(),
-                    polygon=self._gait.present_polygon(settings.whole_body.zmp_margin),
-                    spent=references.spent(contacts),
-                    events=events,
-                )
+        judgement = self._judge.judge(
+            *(state.time, preview.times),
+            lambda com_band: stage_2(self._need_stage, self._com.anticipated, model, judged, com_band)[0],
+            height=height,
+            model=model,
+            carried=carried,
+            support=judged,
+            palms=self._measured.palms,
+            mass=mass,
+            events=events,
+        )
         forces = contacts.forces + carried
         if contacts.forces.any():  # hands that brace carry nothing: either force is all there is
             model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
-        com_band = references.com_band(contacts, gated, sigma, gated_foot)
+        com_band = references.com_band(contacts, gated, sigma, foot)
         motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
         stage2 = stage_report(solution, begin)
         if motion is not None:
@@ -187,16 +168,16 @@ class Planner:
             com_height_band=band,
             zmp=motion.zmp if motion else failed[:, :2],
             support_polygon=polygon.vertices,
-            delta_z=delta_z,
+            delta_z=judgement.delta_z,
             hand_reference=gated,
             contact_force=forces,
             contact_phase=np.array([c.phase for c in contacts.hands]),
             contact_patch=(contacts.name(0), contacts.name(1)),
-            progress=references.progress,
+            progress=self._tasks.rate,
             stage1=stage1,
             stage2=stage2,
-            stage3=stage3,
-            candidates=candidates,
+            stage3=judgement.stage3,
+            candidates=judgement.candidates,
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
@@ -206,8 +187,8 @@ class Planner:
         arm_keep_out = self._keep_out.of_arms(
             *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
         )
-        if references.lifting is not None:
-            references.lifting.guard(arm_keep_out)
+        if self._tasks.lifting is not None:
+            self._tasks.lifting.guard(arm_keep_out)
         self._last = assemble(
             report,
             step=preview.step,
@@ -239,7 +220,7 @@ class Planner:
 
     def _advance(self, state: RobotState, events: list[str]) -> None:
         """Steps, tasks, contacts and the postures behind them one plan further."""
-        contacts, references, dt = self._contacts, self._references, self._elapsed
+        contacts, dt = self._contacts, self._elapsed
         gate_open = contacts.gate_open
         go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
         self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
@@ -254,7 +235,7 @@ class Planner:
             zmp=self._measured.feet_zmp,
             events=events,
         )
-        references.advance(
+        self._tasks.advance(
             state.time,
             dt,
             gate_open=gate_open,
@@ -298,14 +279,6 @@ class Planner:
     def _haste(self) -> float:
         """The alarm of a robot that stands; one that steps is not to stop, its coming steps catch it."""
         return self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
-
-    def _goal_need(self, mass: float) -> Need | None:
-        """The need where the current task ends, on the feet that will carry it; None without such a task."""
-        com = self._references.goal_com
-        if com is None:
-            return None
-        polygon = self._gait.goal_polygon(self._settings.whole_body.zmp_margin)
-        return need_at_rest(com, polygon=polygon, mass=mass)
 
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
         """Support to judge the need for a contact by, at full pace, and to move in, at the gate's.

@@ -7,14 +7,12 @@ import numpy as np
 from wbmpc.planner.bands import horizontal_band
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.lean import Lean
-from wbmpc.planner.lift import Lift
 from wbmpc.planner.posture import PalmTarget, Posture
-from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
 from wbmpc.planner.stride import Stride
+from wbmpc.planner.tasks import Tasks
 from wbmpc.robot import Robot
 from wbmpc.rotations import angle_difference
-from wbmpc.scenario import ComHeightTask, LeanTask, Load, ReachTask, Task
 from wbmpc.signals import SIDES, HandMode, Vector
 
 REACH_FLOOR, FOOT_FLOOR = 0.12, 0.05  # [m] smallest d of hand and foot: neither pins the CoM to itself
@@ -26,7 +24,6 @@ LIFT_COM_COST = 10.0  # [cost / m²] how hard a lift's posture keeps its CoM ove
 LIFT_TILT_COST = 0.03  # [cost / rad²] how hard a lift's posture keeps the torso up: knees bend, not the back
 LIFT_SLACK = 0.01  # [m] of d of the hands that lift
 LEAN_BAND = 0.001  # [m] d of the CoM from a lean's way
-SHRINK_RATE, SHRINK_LIMIT = 1.0, 0.02  # [1/s], [m] how a held hand that stays short tightens its d
 
 
 class References:
@@ -36,81 +33,19 @@ class References:
     what the task would need if nothing held it up: that is what the need for a contact is judged by.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        tasks: tuple[Task, ...],
-        loads: tuple[Load, ...],
-        *,
-        q: Vector,
-        palms: Vector,
-        heading: float,
-        height: float,
-        times: Vector,
-    ) -> None:
-        """Start with palms at `palms` (2, 3) [m], the feet's `heading` [rad] and the CoM at `height` [m].
-
-        `times` (N,) are the knots [s].
-        """
-        self._times, self._nominal_height = times, height
-        self.reaches = [
-            Reach(task, side=_hand_of(task, palms), palm=palms[_hand_of(task, palms)])
-            for task in tasks
-            if isinstance(task, ReachTask)
-        ]
-        self.leans = [Lean(task) for task in tasks if isinstance(task, LeanTask)]
-        lifts = [Lift(load, palms=palms, heading=heading, palm_radius=robot.palm_radius) for load in loads]
-        self.lift = lifts[0] if lifts else None
-        self._low, self._high = (  # the palms on the box, and at the top
-            Posture(robot, nominal=q, com_cost=LIFT_COM_COST, tilt_cost=LIFT_TILT_COST) for _ in range(2)
-        )
-        self._tasks: list[Reach | Lean] = [*self.reaches, *self.leans]
-        self._heights = [task for task in tasks if isinstance(task, ComHeightTask)]
+    def __init__(self, robot: Robot, tasks: Tasks, *, q: Vector, height: float, times: Vector) -> None:
+        """Start with the posture `q` (nq,) and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
+        self._tasks, self._times, self._nominal_height = tasks, times, height
         self._stand = Posture(robot, nominal=q, com_cost=COM_COST)
         self._reach_goal = Posture(robot, nominal=q, com_cost=COM_COST)
-        self._stride: Stride | None = None
         self._lean_goal = Posture(robot, nominal=q, com_cost=LEAN_COST)
+        self._low, self._high = (  # the palms on the box to be lifted, and at the top
+            Posture(robot, nominal=q, com_cost=LIFT_COM_COST, tilt_cost=LIFT_TILT_COST) for _ in range(2)
+        )
+        self._stride: Stride | None = None
         self._centre = np.zeros(2)  # [m] between the feet
-        self._shrink = 0.0  # [m] taken off d
 
     # ------------------------------------------------------------------ once a plan
-
-    def advance(
-        self,
-        time: float,
-        dt: float,
-        *,
-        gate_open: bool,
-        palms: Vector,
-        palm_forces: Vector,
-        homes: Vector,
-        com: Vector,
-        events: list[str],
-    ) -> None:
-        """Every task one plan further.
-
-        Args:
-            palms, palm_forces: measured (2, 3) [m], [N]; `homes` (2, 3) [m]: where free palms hang.
-            com: measured (3,) [m].
-        """
-        if self.lift is not None:
-            phase = self.lift.phase
-            self.lift.advance(time, dt, palms=palms, palm_forces=palm_forces, homes=homes)
-            if self.lift.phase != phase:
-                events.append(f"lift: {phase.name.lower()} -> {self.lift.phase.name.lower()}")
-        for task in self._tasks:
-            before = task.progress.phase
-            if isinstance(task, Reach):
-                name, palm = f"reach {SIDES[task.side]}", palms[task.side]
-                task.advance(time, dt, gate_open=gate_open, palm=palm)
-                if task.progress.phase == TaskPhase.HOLD:
-                    short = float(np.linalg.norm(palm - task.target)) - 0.5 * task.task.tolerance
-                    self._shrink = min(max(self._shrink + SHRINK_RATE * dt * short, 0.0), SHRINK_LIMIT)
-            else:
-                name = "lean"
-                task.advance(time, dt, gate_open=gate_open, com=com)
-            if task.progress.phase != before:
-                events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
 
     def update_postures(
         self,
@@ -133,44 +68,26 @@ class References:
         self._stand.iterate(iterations, soles=soles, yaws=yaws, palms=[None, None], centre=centre)
         if stride is not None:
             soles, yaws = stride.after.positions, stride.after.yaws
-        if self.lift is not None and self.lift.ahead:
-            for posture, ends in ((self._low, self.lift.grasp), (self._high, self.lift.top)):
-                held = [PalmTarget(end, normal) for end, normal in zip(ends, self.lift.normals, strict=True)]
+        if self._tasks.lift is not None and self._tasks.lift.ahead:
+            for posture, ends in ((self._low, self._tasks.lift.grasp), (self._high, self._tasks.lift.top)):
+                held: list[PalmTarget | None] = [
+                    PalmTarget(end, normal) for end, normal in zip(ends, self._tasks.lift.normals, strict=True)
+                ]
                 posture.iterate(iterations, soles=soles, yaws=yaws, palms=held, centre=centre)
         palms: list[PalmTarget | None] = [c.target for c in contacts.hands]
-        for task in self._current:
+        for task in self._tasks.current:
             if isinstance(task, Lean):
                 centre = task.target
             else:
                 palms[task.side] = PalmTarget(task.target)
-        if stride is not None or self._leaning is not None or any(palm is not None for palm in palms):
+        if stride is not None or self._tasks.leaning is not None or any(palm is not None for palm in palms):
             self._goal.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     @property
-    def _current(self) -> list[Reach] | list[Lean]:
-        """The reaches still to be done, or the lean that comes before them."""
-        reaches = [reach for reach in self.reaches if reach.progress.phase != TaskPhase.DONE]
-        leans = [lean for lean in self.leans if lean.progress.phase != TaskPhase.DONE]
-        first = min(leans, key=lambda lean: lean.task.start, default=None)
-        if first is None or any(reach.task.start < first.task.start for reach in reaches):
-            return reaches
-        return [first]
-
-    @property
-    def _leaning(self) -> Lean | None:
-        """The lean that is current, if one is."""
-        return next((task for task in self._current if isinstance(task, Lean)), None)
-
-    @property
-    def lifting(self) -> Lift | None:
-        """The lift that moves the hands now, if one does."""
-        return self.lift if self.lift is not None and self.lift.active else None
-
-    @property
     def _goal(self) -> Posture:
-        if self.lifting is not None:
-            return self._high if self.lifting.raised else self._low
-        return self._lean_goal if self._leaning is not None else self._reach_goal
+        if self._tasks.lifting is not None:
+            return self._high if self._tasks.lifting.raised else self._low
+        return self._lean_goal if self._tasks.leaning is not None else self._reach_goal
 
     # ------------------------------------------------------------------ over the horizon
 
@@ -187,14 +104,14 @@ class References:
         for contact in contacts.hands if contacts is not None else ():
             if contact.goal is not None:
                 references[contact.side] = contact.preview(times)
-        for task in self._current:
+        for task in self._tasks.current:
             sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
             sigma = np.maximum(sigma, sigmas)
             if isinstance(task, Reach):
                 references[task.side] = task.preview(sigmas)
-        if self.lifting is not None:
-            references[:] = self.lifting.preview(times)
-            sigma = np.maximum(sigma, self.lifting.sigmas(times))
+        if self._tasks.lifting is not None:
+            references[:] = self._tasks.lifting.preview(times)
+            sigma = np.maximum(sigma, self._tasks.lifting.sigmas(times))
         return references, sigma
 
     def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector, foot: Vector) -> Vector:
@@ -209,7 +126,7 @@ class References:
             places = np.concatenate([places, self._stride.positions(foot)[None]])
             distance = np.concatenate([distance, self._foot_distance(contacts, foot)[None]])
         band = horizontal_band(places, distance)
-        lean = self._leaning
+        lean = self._tasks.leaning
         if lean is None:
             return band
         way = lean.preview(sigma, home=self._centre).T  # (2, N)
@@ -224,9 +141,9 @@ class References:
         """
         base = self._base(contacts).com[2]
         wanted = np.full(len(self._times), base)
-        if self._current or self._stride is not None or self.lifting is not None:
+        if self._tasks.current or self._stride is not None or self._tasks.lifting is not None:
             wanted += sigma * (self._goal.com[2] - base)
-        for task in self._heights:
+        for task in self._tasks.heights:
             knots = [0.0] + [w.time for w in task.waypoints]
             heights = [self._nominal_height] + [w.height for w in task.waypoints]
             wanted = np.interp(time + self._times, knots, heights)
@@ -234,7 +151,7 @@ class References:
 
     def _base(self, contacts: Contacts) -> Posture:
         """What the robot does without a task: stand, or brace; from where it goes on: hold what it lifts."""
-        if self.lifting is not None and self.lifting.raised:
+        if self._tasks.lifting is not None and self._tasks.lifting.raised:
             return self._low
         return contacts.posture if contacts.posture is not None else self._stand
 
@@ -255,29 +172,30 @@ class References:
         for contact in contacts.hands:
             if contact.goal is not None and braced is not None:
                 distance[contact.side] = np.abs(contact.goal[:2] - braced.com[:2])
-                if self._current or self._stride is not None:
+                if self._tasks.current or self._stride is not None:
                     with_task = np.abs(contact.goal[:2] - self._goal.com[:2])
                     distance[contact.side] = np.maximum(distance[contact.side], with_task)
-        for task in self._current:
+        for task in self._tasks.current:
             if isinstance(task, Reach):
-                distance[task.side] = np.abs(task.target[:2] - self._goal.com[:2]) - self._shrink
-        if self.lifting is not None:
+                distance[task.side] = np.abs(task.target[:2] - self._goal.com[:2]) - self._tasks.shrink
+        if self._tasks.lifting is not None:
             distance[:] = self._lift_distance[:, :2] + LIFT_SLACK
         return np.maximum(distance, REACH_FLOOR)
 
     def carried(self, times: Vector) -> Vector:
         """Forces (2, n, 3) [N] on the palms of what they hold, in world, `times` (n,) seconds from now."""
-        return np.zeros((len(SIDES), len(times), 3)) if self.lifting is None else self.lifting.forces(times)
+        lift = self._tasks.lifting
+        return np.zeros((len(SIDES), len(times), 3)) if lift is None else lift.forces(times)
 
     def height_distance(self, usual: float) -> Vector:
         """d (2,) of each hand [m] for the CoM height: `usual`, or what lies between the two in a lift's postures."""
-        return np.full(2, usual) if self.lifting is None else self._lift_distance[:, 2] + LIFT_SLACK
+        return np.full(2, usual) if self._tasks.lifting is None else self._lift_distance[:, 2] + LIFT_SLACK
 
     @property
     def _lift_distance(self) -> Vector:
         """(2, 3) [m] the larger distance of each palm from the CoM, with the box down or up."""
-        assert self.lift is not None
-        low, high = self.lift.grasp - self._low.com, self.lift.top - self._high.com
+        assert self._tasks.lift is not None
+        low, high = self._tasks.lift.grasp - self._low.com, self._tasks.lift.top - self._high.com
         return np.maximum(np.abs(low), np.abs(high))
 
     # ------------------------------------------------------------------ now
@@ -295,10 +213,7 @@ class References:
     @property
     def _sigma(self) -> float:
         """Progress of the furthest task or the stride."""
-        if self.lifting is not None:
-            return self.lifting.sigma
-        tasks = max((task.progress.sigma for task in self._current), default=0.0)
-        return tasks if self._stride is None else max(tasks, self._stride.sigma)
+        return self._tasks.sigma if self._stride is None else max(self._tasks.sigma, self._stride.sigma)
 
     def torso_heading(self, contacts: Contacts, feet: float) -> float:
         """Yaw of the torso [rad]: the feet's, `feet`, or as in those postures."""
@@ -312,11 +227,6 @@ class References:
             return ()
         return tuple(c.side for c in contacts.hands if c.touching and self._goal.palm_errors[c.side] > SPENT)
 
-    def hands_taken(self) -> list[bool]:
-        """Which hands belong to a task (left, right), now or later."""
-        taken = [task.side for task in self._current if isinstance(task, Reach)]
-        return [side in taken or (self.lift is not None and self.lift.ahead) for side in range(len(SIDES))]
-
     def hand_targets(self, contacts: Contacts, palms: Vector) -> list[tuple[Vector, Vector, HandMode]]:
         """Position (3,) [m], velocity (3,) [m/s] and mode of each hand; a free hand is where it is, `palms` (2, 3)."""
         targets = []
@@ -325,28 +235,15 @@ class References:
             target = (palms[side], np.zeros(3), HandMode.FREE)
             if contact.busy:
                 target = (*contact.reference()[:2], contact.mode)
-            for reach in self.reaches:
+            for reach in self._tasks.reaches:
                 if reach.side == side and reach.progress.active:
                     target = (*reach.reference()[:2], HandMode.MOVE)
-            if self.lifting is not None:
-                target = (*self.lifting.reference(side), self.lifting.mode)
+            if self._tasks.lifting is not None:
+                target = (*self._tasks.lifting.reference(side), self._tasks.lifting.mode)
             targets.append(target)
         return targets
 
     @property
     def goal_com(self) -> Vector | None:
         """CoM (3,) [m] where the current task ends; None when none is on its way or holding."""
-        ahead = self._stride is not None or any(task.progress.ahead for task in self._current)
-        return self._goal.com if ahead else None
-
-    @property
-    def progress(self) -> float:
-        """Rate of the slowest task's clock, 0 … 1."""
-        return min((task.progress.rate for task in self._tasks), default=1.0)
-
-
-def _hand_of(task: ReachTask, palms: Vector) -> int:
-    """The hand a reach takes: the one it names, or the one nearer to the target (left when equal)."""
-    if task.hand != "auto":
-        return SIDES.index(task.hand)
-    return int(np.argmin(np.linalg.norm(palms - np.array(task.target), axis=1)))
+        return self._goal.com if self._stride is not None or self._tasks.ahead else None

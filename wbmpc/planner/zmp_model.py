@@ -78,7 +78,7 @@ def need_of(
     mass: float,
     exact: bool,
 ) -> Need:
-    """What stage 3 must know of a plan `wish` whose ΔZ was free; `model` is the ZMP it was made with, of no new contact.
+    """What stage 3 must know of a plan `wish` whose ΔZ was free; `model` is the ZMP that it was made with.
 
     `carried` (N,) is the vertical force [N] of what the hands hold, already in that model.
 

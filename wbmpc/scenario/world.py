@@ -112,8 +112,12 @@ def _add_objects(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     for name, box in scenario.world.objects.items():
         if not box.present:
             continue
-        pose = {"pos": list(box.centre), "quat": [math.cos(box.yaw / 2), 0, 0, math.sin(box.yaw / 2)]}
-        body, placed = None, pose
+        pose: dict[str, list[float]] = {
+            "pos": list(box.centre),
+            "quat": [math.cos(box.yaw / 2), 0, 0, math.sin(box.yaw / 2)],
+        }
+        body: Any = None
+        placed: dict[str, Any] = dict(pose)
         if box.mass is not None:
             body, placed = spec.worldbody.add_body(name=name, **pose), {"mass": box.mass}
             body.add_freejoint(name=f"{name}_free")

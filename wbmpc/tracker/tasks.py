@@ -12,7 +12,9 @@ from wbmpc.tracker.settings import TrackerSettings
 
 COM, MOMENTUM, TORSO, FEET, HANDS = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 21), slice(21, 27)
 TASK_ROWS = 27
-FREE, CONTACT, CARRY = (int(mode) for mode in (HandMode.FREE, HandMode.CONTACT, HandMode.CARRY))  # plain numbers: enum look-ups cost microseconds
+FREE, CONTACT, CARRY = (
+    int(mode) for mode in (HandMode.FREE, HandMode.CONTACT, HandMode.CARRY)
+)  # plain numbers: enum look-ups cost microseconds
 
 
 class TaskStack:

@@ -15,7 +15,7 @@ class Lifted(CheckSettings):
 
     kind: Literal["lifted"]
     min: Positive = Field(default=0.10, description="Least rise of the box's lowest point since the start [m].")
-    max_tilt: Positive = Field(default=0.35, description="Largest angle of the box's upright axis to the vertical [rad].")
+    max_tilt: Positive = Field(default=0.35, description="Largest tilt of the box [rad].")
     duration: Positive = Field(default=2.0, description="Length of the stretch at the end of the run [s].")
 
 

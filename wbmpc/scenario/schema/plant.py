@@ -36,7 +36,8 @@ class PlantSettings(StrictModel):
 
     mass_scale: MassScale = Field(default=1.0, description="Factor on mass and inertia of all the robot's bodies [-].")
     body_mass_scale: dict[str, MassScale] = Field(
-        default={}, description="Further factors on mass and inertia, by name of the robot's body or of an object that has a mass [-]."
+        default={},
+        description="Further factors on mass and inertia, by name of a body or of an object with a mass [-].",
     )
     friction: Friction | None = Field(
         default=None, description="True friction coefficient of floor and objects [-]; null: as declared in `world`."

@@ -168,5 +168,5 @@ FootworkTask = WalkTask | StepTask | GoTask  # the tasks that move the feet
 
 Task = Annotated[
     StandTask | ComHeightTask | ReachTask | LeanTask | WalkTask | StepTask | GoTask | LiftTask,
-    Field(discriminator="kind")
+    Field(discriminator="kind"),
 ]

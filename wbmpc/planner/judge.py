@@ -1,0 +1,95 @@
+"""Whether the tasks need a contact, and which: stage 2 with ΔZ free and everything at full pace, then stage 3."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.contact_force import Need
+from wbmpc.planner.contacts import NOT_RUN, Contacts
+from wbmpc.planner.gait import Gait
+from wbmpc.planner.references import References
+from wbmpc.planner.settings import PlannerSettings
+from wbmpc.planner.support_preview import SupportPreview
+from wbmpc.planner.tasks import Tasks
+from wbmpc.planner.whole_body import HorizontalPlan, ZmpModel
+from wbmpc.planner.zmp_model import need_at_rest, need_of
+from wbmpc.signals import CandidateReport, StageReport, Vector
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What stages 2 and 3 say to the need for a contact."""
+
+    delta_z: Vector  # (N, 2) [m] the shift asked for; 0 when nobody was asked
+    candidates: tuple[CandidateReport, ...] = ()
+    stage3: StageReport = NOT_RUN
+
+
+class Judge:
+    """Asks stage 2 what the tasks would need if nothing held them up, and leaves the rest to the contacts."""
+
+    def __init__(
+        self, settings: PlannerSettings, *, gait: Gait, references: References, contacts: Contacts, tasks: Tasks
+    ) -> None:
+        self._settings, self._margin = settings, settings.whole_body.zmp_margin
+        self._gait, self._references, self._contacts, self._tasks = gait, references, contacts, tasks
+
+    def judge(
+        self,
+        time: float,
+        times: Vector,
+        ask: Callable[[Vector], HorizontalPlan | None],
+        *,
+        height: HeightPlan,
+        model: ZmpModel,
+        carried: Vector,
+        support: SupportPreview,
+        palms: Vector,
+        mass: float,
+        events: list[str],
+    ) -> Judgement:
+        """Judge one plan's need and plan the forces of the contacts there are.
+
+        Args:
+            time: now [s]; `times` (N,): the knots [s from now].
+            ask: stage 2 with ΔZ free, given where the CoM may be (2, N, 2) [m].
+            model: the ZMP without contact, what the hands carry included; `carried` (2, N, 3) [N]: its forces.
+            support: at full pace.
+            palms: measured (2, 3) [m].
+            mass: [kg].
+        """
+        nothing = Judgement(np.zeros((len(times), 2)))
+        if not self._settings.contact_stage:
+            return nothing
+        contacts, references, gait = self._contacts, self._references, self._gait
+        palm_paths, sigma = references.palms(time, None, pace=1.0)
+        wish = ask(references.com_band(contacts, palm_paths, sigma, gait.shares(times, 1.0)))
+        if wish is None:
+            return nothing
+        need = need_of(
+            *(wish, height, model),
+            carried=carried[:, :, 2].sum(axis=0),
+            polygons=support.polygons,
+            mass=mass,
+            exact=self._settings.formulation == "exact",
+        )
+        candidates, stage3 = contacts.plan(
+            need,
+            goal=self._goal_need(mass),
+            binding=gait.stride is not None,
+            palms=palms,
+            hand_taken=self._tasks.hands_taken,
+            polygon=gait.present_polygon(self._margin),
+            spent=references.spent(contacts),
+            events=events,
+        )
+        return Judgement(wish.delta_z, candidates, stage3)
+
+    def _goal_need(self, mass: float) -> Need | None:
+        """The need where the current task ends, on the feet that will carry it; None without such a task."""
+        com = self._references.goal_com
+        return None if com is None else need_at_rest(com, polygon=self._gait.goal_polygon(self._margin), mass=mass)
