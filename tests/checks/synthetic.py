@@ -124,6 +124,7 @@ class SyntheticRun:
                 "table_2": np.array([0.0, 0.0, 1.0]),
                 "wall_1": np.array([0.0, -1.0, 0.0]),
             },
+            "lifted_objects": (),
             "reach_targets": (TARGET,),
             "com_heights": (),
             "sole_vertices": self._corners,

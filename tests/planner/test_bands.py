@@ -59,9 +59,11 @@ def test_without_ends_nothing_binds() -> None:
 def test_height_band_is_where_hands_and_legs_reach(seed: int, plane: float) -> None:
     rng = np.random.default_rng(seed)
     references = ends(rng, count=2, axes=3) + plane + 0.2
-    band = height_band(SETTINGS, references, plane)
+    distance = rng.uniform(0.05, 0.3, 2)
+    band = height_band(SETTINGS, references, distance, plane)
     for k, (low, high) in enumerate(band):
         for c in plane + rng.uniform(0.0, 0.5, 20):
             legs = SETTINGS.lowest <= c - plane <= SETTINGS.highest
-            hands = all(abs(z - c) <= SETTINGS.reach for z in references[:, k, 2] if np.isfinite(z))
+            ends_z = zip(references[:, k, 2], distance, strict=True)
+            hands = all(abs(z - c) <= d for z, d in ends_z if np.isfinite(z))
             assert (low <= c <= high) == (legs and hands)

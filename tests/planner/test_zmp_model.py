@@ -159,9 +159,37 @@ def test_need_of_a_wish(seed: int, exact: bool) -> None:
     )  # fmt: skip
     expected = case.need(shift[0], formulation="exact" if exact else "paper")
     model = free_model(preview, height, plane=PLANE, mass=MASS, exact=exact)
-    need = need_of(wish, height, model, polygons=expected.polygons, mass=MASS, exact=exact)
+    need = need_of(wish, height, model, carried=np.zeros(1), polygons=expected.polygons, mass=MASS, exact=exact)
     for name in ("delta_z", "zmp", "weight", "phantom"):
         assert_allclose(getattr(need, name), getattr(expected, name), atol=1e-9)
+
+
+@given(seed=seeds)
+def test_need_of_a_wish_with_something_in_the_hands(seed: int) -> None:
+    """Case a and case b at once: the contact's force shifts the pressure that the carried thing has moved already."""
+    rng = np.random.default_rng(seed)
+    case, preview = Case(seed), Preview(steps=1, step=0.1)
+    height = height_plan(case.com[2:], case.acceleration[2:])
+    held_at, weight = rng.uniform([0.05, -0.1, 0.05], [0.2, 0.1, 0.3]), np.array([0.0, 0.0, -rng.uniform(1.0, 8.0)])
+    model = loaded_model(preview, height, forces=weight[None, None], points=[held_at[None]], plane=PLANE, mass=MASS)
+    zero = np.zeros((1, 2))
+    wish = HorizontalPlan(
+        jerk=zero, com=case.com[None, :2], velocity=zero, acceleration=case.acceleration[None, :2], delta_z=zero,
+        zmp=zero, footstep_shift=zero, joint_velocity=np.zeros(0),
+    )  # fmt: skip
+    polygons = case.need(np.zeros(2), formulation="exact").polygons
+    need = need_of(wish, height, model, carried=weight[2:], polygons=polygons, mass=MASS, exact=True)
+    alone = centre_of_pressure(
+        mass=MASS, com=case.com, acceleration=case.acceleration, plane_height=PLANE, point=held_at, force=weight
+    )
+    both = centre_of_pressure(
+        mass=MASS, com=case.com, acceleration=case.acceleration, plane_height=PLANE,
+        point=np.array([held_at, case.point]), force=np.array([weight, case.force]),
+    )  # fmt: skip
+    assert_allclose(need.zmp[0], alone, atol=1e-9)
+    lever = case.point[2] - PLANE
+    numerator = need.weight[0] * need.zmp[0] + lever * case.force[:2] - case.point[:2] * case.force[2]
+    assert_allclose(numerator / (need.weight[0] - case.force[2]), both, atol=1e-9)
 
 
 def height_plan(height: Vector, acceleration: Vector) -> HeightPlan:

@@ -7,13 +7,13 @@ from enum import IntEnum
 import numpy as np
 
 from wbmpc.planner.hand_path import HandPath, minimum_jerk
-from wbmpc.planner.posture import ELBOW_CLEARANCE
 from wbmpc.rotations import level_frame
 from wbmpc.scenario import Load
 from wbmpc.signals import GRAVITY, HandMode, Vector
 
 GRASP_UP = 0.5  # of the half height, from the centre to the grasp: held above its centre a box hangs upright
 GAP = 0.03  # [m] between palm and face where the closing begins
+ELBOW_OUT = 0.018  # [m] of an elbow beyond its palm, away from the box: forearms are as thick as palms
 SEARCH = 0.02  # [m] how far behind its face a palm looks for the box
 ARRIVED = 0.015  # [m] of both palms, before they close
 PATIENCE = 2.0  # [s] waited for that
@@ -138,7 +138,7 @@ class Lift:
     def guard(self, arm_keep_out: Vector) -> None:
         """Keep the elbows outside the box's faces: write their half-spaces into (2, 3, 5), see `KeepOut.of_arms`."""
         arm_keep_out[:, 2, :3], arm_keep_out[:, 2, 4] = self.normals, 1.0
-        arm_keep_out[:, 2, 3] = np.einsum("si,si->s", self.normals, self.grasp) + ELBOW_CLEARANCE
+        arm_keep_out[:, 2, 3] = np.einsum("si,si->s", self.normals, self.grasp) + ELBOW_OUT
 
     @property
     def _squeeze(self) -> float:
