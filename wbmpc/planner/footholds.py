@@ -19,7 +19,7 @@ class Footholds:
     def __init__(self, obstacles: tuple[Obstacle, ...], half_extents: Vector) -> None:
         """`half_extents` (2,) of a sole [m]."""
         self._low = [o for o in obstacles if o.bottom < REACH_UP]
-        self._half = half_extents + MARGIN
+        self._sole, self._half = half_extents, half_extents + MARGIN
 
     def free(self, position: Vector, yaw: float) -> bool:
         """Whether a sole with its centre at `position` (2,) [m] stands clear of every obstacle."""
@@ -29,11 +29,11 @@ class Footholds:
     def crossed(self, start: Vector, end: Vector, yaw: float) -> float | None:
         """Height to lift a sole by on its straight way from `start` to `end` (2,) [m]: 0 when nothing is in the way.
 
-        None: something is too high to step over.
+        None: something is too high to step over. Where a foot has landed it may stand closer than the margin to what it
+        leaves: that is no longer in its way.
         """
-        swept = convex_hull(
-            np.vstack([foot_corners(position=p, yaw=yaw, half_extents=self._half) for p in (start, end)])
-        )
+        sides = ((start, self._sole), (end, self._half))
+        swept = convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in sides]))
         tops = [obstacle.top for obstacle in self._low if _overlap(swept, obstacle.corners)]
         if any(top > REACH_UP for top in tops):
             return None
