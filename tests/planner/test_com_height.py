@@ -49,6 +49,36 @@ def cost(s: HeightSettings, plan: HeightPlan, wanted: Vector, limits: Vector, ba
 
 
 @settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), share=st.floats(0.0, 1.0))
+def test_no_plan_nearby_costs_less_when_the_middle_of_the_band_has_its_share(seed: int, share: float) -> None:
+    """The paper's remark: w_p ((1 − s) |C − C_posture|² + s |C − C_middle|²) as a sum of two squares."""
+    rng = np.random.default_rng(seed)
+    state = np.array([rng.uniform(0.20, 0.24), 0.0, 0.0])
+    wanted, middle = np.full(N, rng.uniform(0.2, 0.24)), np.full(N, rng.uniform(0.2, 0.24))
+    band = np.column_stack([middle - 0.06, middle + 0.06])
+    plan = solve(stage(middle_share=share), state, wanted, OPEN, band)
+
+    def price(jerk: Vector) -> float:
+        height, velocity = PREVIEW.P_ps @ state + PREVIEW.P_pu @ jerk, PREVIEW.P_vs @ state + PREVIEW.P_vu @ jerk
+        away = (1.0 - share) * np.sum((height - wanted) ** 2) + share * np.sum((height - middle) ** 2)
+        return float(
+            SETTINGS.jerk_cost * jerk @ jerk + SETTINGS.velocity_cost * velocity @ velocity + SETTINGS.position_cost * away
+        )
+
+    best = price(plan.jerk)
+    for _ in range(30):
+        assert price(plan.jerk + rng.normal(0.0, 0.05, N)) >= best - 1e-10
+
+
+def test_a_share_of_one_ends_in_the_middle_of_the_band() -> None:
+    state, wanted, band = np.array([0.26, 0.0, 0.0]), np.full(N, 0.26), np.tile([0.18, 0.25], (N, 1))
+    ends = [solve(stage(middle_share=s), state, wanted, LIMITS, band).height[-1] for s in (0.0, 0.5, 1.0)]
+    assert ends[0] == pytest.approx(0.25, abs=2e-3)  # at the edge of the band: where it is wanted is outside
+    assert ends[2] == pytest.approx(0.215, abs=2e-3)
+    assert ends[2] < ends[1] < ends[0]
+
+
+@settings(max_examples=15, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_optimum_is_another_solvers(seed: int) -> None:
     """[M] eq. QP1 with the band and limits, as states tied by eq. state-eq, solved by NNLS."""

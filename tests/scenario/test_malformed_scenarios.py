@@ -379,6 +379,38 @@ MISTAKES = [
     ("two documents", BASE + "---\na: 1\n", "---", "not valid YAML: found another document"),
     ("a list", "- 1\n", "- 1", "expected a mapping of scenario keys, got a list"),
     ("empty", "", "", "the file is empty, expected a mapping of scenario keys"),
+    (
+        "lifted object",
+        second_task("{kind: lift, object: tabel, height: 0.1, start: 7.0}"),
+        "tabel",
+        "tasks.1.object: no object 'tabel', did you mean 'table'?",
+    ),
+    (
+        "fixed object lifted",
+        second_task("{kind: lift, object: table, height: 0.1, start: 7.0}"),
+        "table, height",
+        "tasks.1.object: 'table' is fixed, give it a mass (world.objects.table.mass)",
+    ),
+    (
+        "brace on what gives way",
+        edited("friction: 0.9}", "friction: 0.9, mass: 0.5}"),
+        "table, face",
+        "patches.right.on: 'table' has a mass, it gives way: no hand can brace on it",
+    ),
+    (
+        "hands taken",
+        second_task("{kind: lift, object: crate, height: 0.1, start: 7.0}").replace(
+            "patches:", "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\npatches:", 1
+        ),
+        "kind: reach",
+        "tasks.0: ends at 8.5 s, but tasks.1 (lift) takes both hands from 7 s on",
+    ),
+    (
+        "weightless",
+        edited("friction: 0.9}", "friction: 0.9, mass: 0.0}"),
+        "0.0}",
+        "world.objects.table.mass: must be > 0, got 0.0",
+    ),
 ]
 
 

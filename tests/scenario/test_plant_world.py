@@ -7,12 +7,20 @@ import math
 import mujoco
 import numpy as np
 import pytest
-from base_scenario import load, write
+from base_scenario import edited, load, write
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from wbmpc.errors import RobotError
-from wbmpc.scenario import build_world, load_scenario, resolve_patches, robot_path, vary
+from wbmpc.scenario import (
+    build_world,
+    load_scenario,
+    resolve_loads,
+    resolve_obstacles,
+    resolve_patches,
+    robot_path,
+    vary,
+)
 
 
 def model_of(scenario):
@@ -87,6 +95,42 @@ def test_geoms_options_and_absent_objects(tmp_path):
     absent = vary(scenario, {"world.objects.table.present": False})
     assert "table" not in [model_of(absent).geom(i).name for i in range(model_of(absent).ngeom)]
     assert [patch.object for patch in resolve_patches(absent)] == ["table"]
+
+
+def test_an_object_with_a_mass_is_free_and_the_robot_is_placed_as_before(tmp_path):
+    """It falls, comes to rest and weighs what is said, times what the plant makes of it; the robot's mass does not."""
+    scenario = load(tmp_path, edited("patches:\n  right: {on: table,", "patches:\n  right: {on: desk,").replace(
+        "    table: {", "    crate: {kind: box, size: [0.1, 0.1, 0.2], position: [0.5, 0.4], bottom: 0.02, mass: 0.3}\n"
+        "    desk: {", 1,
+    ))  # fmt: skip
+    scenario = vary(scenario, {"plant.mass_scale": 1.1, "plant.body_mass_scale": {"crate": 1.5}})
+    model = model_of(scenario)
+    assert model.body("crate").mass == pytest.approx(0.45)
+    inertia = 0.45 / 12 * np.array([0.1**2 + 0.2**2, 0.1**2 + 0.2**2, 2 * 0.1**2])
+    np.testing.assert_allclose(np.sort(model.body("crate").inertia), np.sort(inertia), rtol=1e-9)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    np.testing.assert_allclose(data.qpos[:8], [0, 0, 0.06, 1, 0, 0, 0, 0])
+    np.testing.assert_allclose(data.qpos[8:], [0.5, 0.4, 0.12, 1, 0, 0, 0])
+    for _ in range(2000):
+        mujoco.mj_step(model, data)
+    crate = model.geom("crate").id
+    weight = sum(_normal_force(model, data, i) for i in range(data.ncon) if crate in data.contact[i].geom)
+    assert weight == pytest.approx(0.45 * 9.81, rel=1e-3)
+    assert data.body("crate").xpos[2] == pytest.approx(0.1, abs=1e-3)
+
+
+def test_what_is_to_be_lifted_is_no_obstacle_and_an_absent_load_is_believed_in(tmp_path):
+    text = edited("disturbances:", "  - {kind: lift, object: crate, height: 0.1, start: 8.5, reach_time: 1.0, "
+        "raise_time: 1.0}\ndisturbances:").replace("patches:", "    crate: {kind: box, size: [0.1, 0.2, 0.3], "
+        "position: [0.2, 0.1], yaw: 0.2, mass: 0.4, present: false}\npatches:", 1)  # fmt: skip
+    scenario = load(tmp_path, text)
+    assert len(resolve_obstacles(scenario)) == 1
+    (load_,) = resolve_loads(scenario)
+    np.testing.assert_allclose(load_.centre, [0.2, 0.1, 0.15])
+    np.testing.assert_allclose(load_.half, [0.05, 0.1, 0.15])
+    assert (load_.yaw, load_.mass) == (0.2, 0.4)
+    assert model_of(scenario).nq == 8
 
 
 def test_robot_touches_objects(tmp_path):

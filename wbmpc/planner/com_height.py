@@ -29,8 +29,9 @@ class ComHeightStage:
                                      state outside them still has a plan), and
                 R − d ≤ C ≤ R + d    the band of [M] eq. QP1 (soft: two end-effectors may disagree).
 
-    The paper minimises the jerk alone; that drifts inside the band, hence the weak velocity and position terms
-    (the paper's own remark: "a weakly weighted objective … the middle of the admissible region").
+    The paper minimises the jerk alone; that drifts inside the band, hence the weak velocity and position terms. C_wanted
+    is what the postures of tasks and contacts say; a `middle_share` of the weight goes to the middle of the band instead,
+    the paper's own remark: w_p ((1 − s) |C − C_posture|² + s |C − C_middle|²), up to a constant.
     """
 
     def __init__(self, preview: Preview, settings: HeightSettings, *, backend: str) -> None:
@@ -79,12 +80,14 @@ class ComHeightStage:
         """
         preview, settings, qp = self._preview, self._settings, self.problem
         drift = preview.P_ps @ state
-        qp.gradient[:] = settings.velocity_cost * (preview.P_vu.T @ (preview.P_vs @ state)) + settings.position_cost * (
-            preview.P_pu.T @ (drift - wanted)
-        )
         n = preview.steps
         qp.lower[:n], qp.upper[:n] = limits[:, 0] - drift, limits[:, 1] - drift
         low, high = band[:, 0], band[:, 1]
+        if settings.middle_share and np.isfinite(band).all():
+            wanted = wanted + settings.middle_share * (0.5 * (low + high) - wanted)
+        qp.gradient[:] = settings.velocity_cost * (preview.P_vu.T @ (preview.P_vs @ state)) + settings.position_cost * (
+            preview.P_pu.T @ (drift - wanted)
+        )
         crossed = low > high
         if crossed.any():  # two end-effectors disagree: the compromise between them
             low, high = low.copy(), high.copy()

@@ -15,6 +15,9 @@ class HeightSettings(StrictModel):
     jerk_cost: float = Field(1e-6, gt=0, description="[cost / (m/s³)²] weight of the vertical jerk")
     velocity_cost: float = Field(1e-2, ge=0, description="[cost / (m/s)²] weight of the vertical velocity")
     position_cost: float = Field(1.0, ge=0, description="[cost / m²] weight of the distance to the wanted height")
+    middle_share: float = Field(
+        0.0, ge=0, le=1, description="share of position_cost that draws to the middle of the band, the paper's remark"
+    )
     limit_slack_cost: float = Field(1e5, gt=0, description="[cost / m²] price of leaving the legs' range")
     band_slack_cost: float = Field(1e3, gt=0, description="[cost / m²] price of leaving the band of an end-effector")
     lowest: float = Field(0.16, gt=0, description="[m] lowest CoM above the feet that the legs allow")
