@@ -94,8 +94,8 @@ class _Worker(Generic[Item, Result]):
         context = get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-        # A terminal sends Ctrl-C to all. Blocked from birth in the child, it is for the parent to decide. Python's resource
-        # tracker, which comes up with the first process, would unblock it again.
+        # A terminal sends Ctrl-C to all. Blocked from birth in the child, it is for the parent to decide.
+        # Python's resource tracker, which comes up with the first process, would unblock it again.
         resource_tracker.ensure_running()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
