@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import multiprocessing
+import subprocess
+import sys
 from contextlib import closing
+from pathlib import Path
 
 import pytest
 from pool_work import interrupted, killed, raising, squared
@@ -46,6 +49,14 @@ def test_a_death_costs_one_item_and_says_how() -> None:
 
 def test_workers_leave_ctrl_c_to_the_parent() -> None:
     assert sorted(finished(interrupted, [7, 8], jobs=2)) == [(0, 7), (1, 8)]
+
+
+def test_the_very_first_worker_of_a_program_does_so_too() -> None:
+    """Python's resource tracker comes up with it, and unblocks Ctrl-C."""
+    names = "from pool_work import interrupted; from wbmpc.pool import finished"
+    text = f"{names}; print(sorted(finished(interrupted, [7, 8], jobs=2)))"
+    done = subprocess.run([sys.executable, "-c", text], cwd=Path(__file__).parent, capture_output=True, text=True)
+    assert (done.returncode, done.stderr, done.stdout) == (0, "", "[(0, 7), (1, 8)]\n")
 
 
 def test_an_exception_comes_back_and_ends_all_workers() -> None:

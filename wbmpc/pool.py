@@ -11,7 +11,7 @@ import signal
 from collections.abc import Callable, Generator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
 from typing import Any, Generic, TypeVar
 
@@ -95,6 +95,8 @@ class _Worker(Generic[Item, Result]):
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
         # A terminal sends Ctrl-C to all. Blocked from birth in the child, it is for the parent to decide.
+        # Python's resource tracker, which comes up with the first process, would unblock it again.
+        resource_tracker.ensure_running()
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self.process.start()

@@ -175,7 +175,7 @@ def test_a_surface_that_is_not_there_fails_after_the_search() -> None:
     bench = Bench(surface=None)
     bench.choose()
     bench.run(6.0, lambda: bool(bench.outcomes))
-    assert bench.outcomes == ["failed"]
+    assert bench.outcomes == ["missing"]
     lowest = PATCH.position[2] + RADIUS - SETTINGS.search_depth
     assert min(c[2] for c in bench.commands) == pytest.approx(lowest, abs=1e-9)
     bench.contact.release(palm=bench.palm, home=HOME)  # as the planner does then
@@ -187,7 +187,7 @@ def test_a_palm_that_never_arrives_fails_after_its_patience() -> None:
     bench = Bench(stuck=True)
     bench.choose()
     used = bench.run(8.0, lambda: bool(bench.outcomes))
-    assert bench.outcomes == ["failed"]
+    assert bench.outcomes == ["unreached"]
     way = np.linalg.norm(PATCH.position + (RADIUS + SETTINGS.approach_clearance) * PATCH.normal - HOME)
     assert used == pytest.approx(max(0.4, way / SETTINGS.approach_speed) + PATIENCE, abs=5 * DT)
 
@@ -236,7 +236,7 @@ def test_a_lost_contact_with_nothing_below_fails() -> None:
     bench = loaded_bench()
     bench.surface = None
     bench.run(4.0, lambda: bool(bench.outcomes))
-    assert bench.outcomes == ["failed"]
+    assert bench.outcomes == ["missing"]
 
 
 def test_a_need_that_returns_while_quiet_goes_on() -> None:

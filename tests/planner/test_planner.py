@@ -151,7 +151,7 @@ def test_a_mirrored_target_gives_the_mirrored_choice() -> None:
 
 def test_a_table_that_is_not_there_is_given_up_and_another_patch_tried() -> None:
     result = run(REACH, 7.0, table=False)
-    assert any("not found, excluded" in event for event in result.events)
+    assert any("missing, excluded" in event for event in result.events)
     assert ContactPhase.SENSED not in result.phases(1)
     tried = [c.patch for report in result.fired for c in report.candidates if c.chosen]
     assert len(tried) == len(set(tried))

@@ -101,7 +101,7 @@ def test_a_second_contact_joins_a_first_that_turns_out_too_weak() -> None:
     given = scenario(
         "two_hands", patches=patches, world__objects={"shelf": shelf, "ghost": ghost}, checks=[{"kind": "withdrawn"}]
     )
-    result = run(given, 7.0)
+    result = run(given, 8.0)
     joined = result.fired[-1]
     assert [c.patch for c in result.fired[0].candidates if c.chosen] == ["left", "ghost"]
     assert [c.patch for c in joined.candidates if c.chosen] == ["right"]

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from wbmpc.scenario import load_scenario
+from wbmpc.scenario import load_scenario, vary
 
 NAMES = st.from_regex(r"\A[A-Za-z][A-Za-z0-9_]{0,12}\Z").filter(lambda name: name not in ("floor", "foot", "forearm"))
 
@@ -105,7 +105,7 @@ def documents(draw: st.DrawFn) -> dict[str, object]:
 def test_written_scenario_reads_back_equal(tmp_path: Path, document: dict[str, object]) -> None:
     path = write(tmp_path, b"", name="drawn.yaml")
     yaml = YAML()
-    yaml.allow_unicode = False
+    yaml.allow_unicode, yaml.width = False, 1_000_000  # as `to_yaml` writes, and for the same reasons
     with path.open("w") as stream:
         yaml.dump(document, stream)
     scenario = load_scenario(path)
@@ -120,6 +120,13 @@ def test_text_that_yaml_would_break_survives(tmp_path: Path) -> None:
     scenario = load(tmp_path, text)
     assert scenario.description == "\x85 \u2028 é: #\n\ton"
     assert load(tmp_path, scenario.to_yaml()).description == scenario.description
+
+
+def test_a_long_text_of_escapes_gains_no_blanks(tmp_path: Path) -> None:
+    """ruamel folds such a text at 80 columns, and reads the fold back as a blank more."""
+    description = 12 * "\u0100" + " \u064a" + 12 * "\u0244" + "\u0648 \u064a"
+    scenario = vary(load(tmp_path), {"description": description})
+    assert load(tmp_path, scenario.to_yaml()).description == description
 
 
 def _assert_holds(effective: object, written: object) -> None:

@@ -20,6 +20,7 @@ from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vect
 COM_COST = 4.0  # [cost / m²] how hard a candidate's posture keeps its CoM over the feet
 SEARCH_ITERATIONS = 12  # a plan, of a posture that is not settled
 ELBOW_TOLERANCE = 0.015  # [m] of its posture's elbow under the clearance: the forearm would meet the surface
+MOST_TRIES = 2  # of a palm to get to a patch
 COM_TOLERANCE = 0.004  # [m] how far outside the ZMP bounds a candidate's posture may have its CoM
 
 
@@ -31,12 +32,18 @@ class Candidate:
     hand: int
     posture: Posture
     excluded: bool = False  # it was chosen before and the contact did not appear
+    tries: int = 0  # how often the palm did not get there
     current: bool = False  # its posture has been iterated for the feet as they stand
 
     @property
     def settled(self) -> bool:
         """Whether its posture says if it is in reach."""
         return self.current and self.posture.settled
+
+    def gave_up(self, outcome: str) -> None:
+        """Its contact was not made. From elsewhere the palm may find a way, where there is nothing it finds nothing."""
+        self.tries += 1
+        self.excluded = outcome == "missing" or self.tries >= MOST_TRIES
 
     def goal(self, palm_radius: float) -> PalmTarget:
         """The palm when it rests on the patch."""
@@ -103,6 +110,10 @@ class Candidates:
             count = iterations if candidate.settled else max(iterations, SEARCH_ITERATIONS)
             candidate.posture.iterate(count, soles=soles, yaws=yaws, palms=palms, centre=centre)
             candidate.current = True
+
+    def of(self, patch: PatchPose | None, hand: int) -> Candidate:
+        """The candidate of a hand on a patch."""
+        return next(c for c in self.all if c.patch is patch and c.hand == hand)
 
     @property
     def settled(self) -> bool:

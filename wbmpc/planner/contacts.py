@@ -157,11 +157,11 @@ class Contacts:
                 urgency=urgency,
                 home=homes[side],
             )
-            if outcome == "failed":
-                for candidate in self.candidates.all:
-                    if candidate.patch is contact.patch and candidate.hand == side:
-                        candidate.excluded = True
-                events.append(f"contact {SIDES[side]} {patch}: not found, excluded")
+            if outcome is not None:
+                candidate = self.candidates.of(contact.patch, side)
+                candidate.gave_up(outcome)
+                self._short = True  # what it was chosen for is still asked for
+                events.append(f"contact {SIDES[side]} {patch}: {outcome}{', excluded' if candidate.excluded else ''}")
                 contact.release(palm=palms[side], home=homes[side])
             if contact.phase != before:
                 events.append(f"contact {SIDES[side]} {patch}: {before.name.lower()} -> {contact.phase.name.lower()}")
@@ -211,7 +211,9 @@ class Contacts:
                 self._review(knots)
                 if self._short and any(free) and self._hopeless < GIVE_UP_TIME:
                     reports, stage = self._fire(knots, palms=palms, free=free, polygon=polygon, events=events)
-            if not self._committed or self._short:
+            if any(c.phase == ContactPhase.RELEASED for c in self.hands):
+                pass  # once it is back a hand may be of help
+            elif not self._committed or self._short:
                 self._hopeless += self._period
             elif self._hopeless < GIVE_UP_TIME:
                 self._hopeless = 0.0

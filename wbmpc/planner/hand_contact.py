@@ -187,7 +187,8 @@ class HandContact:
             home: where the palm returns to (3,) [m].
 
         Returns:
-            "failed" when the expected contact was not found and the candidate must be given up, else None.
+            "missing" when there is nothing where the contact should be, "unreached" when the palm did not get there,
+            else None.
         """
         self._urgency = urgency
         if not self.busy or self.patch is None:
@@ -255,11 +256,11 @@ class HandContact:
                 if np.linalg.norm(palm - self._path.end) < self._pace.arrived:
                     self._descent = 0.0
                 elif self._clock > self._duration + PATIENCE:
-                    return "failed"
+                    return "unreached"
             return None
         depth = self._pace.clearance + settings.search_depth
         if self._descent >= depth:
-            return "failed"
+            return "missing"
         self._descent = min(depth, self._descent + self._pace.touch_speed * dt)
         return None
 

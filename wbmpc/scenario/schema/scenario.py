@@ -72,6 +72,7 @@ class Scenario(StrictModel):
     def to_yaml(self) -> str:
         """The effective scenario as YAML text that `load_scenario` reads back."""
         yaml, stream = YAML(), StringIO()
+        yaml.width = 1_000_000  # folded, long escaped texts gain blanks
         yaml.allow_unicode = False  # escapes: written raw, some Unicode characters read back as line breaks
         yaml.dump(self.to_document(), stream)
         return stream.getvalue()
