@@ -82,6 +82,9 @@ LIMITS = {
     "hole_mass": Limit("hole", "plant.mass_scale=%s", "1", 1.0, 0.1, 0.05),
     "two_hands_lean": Limit("two_hands", "tasks.0.target.0=%s", "m", 0.12, 0.005, 0.005),
     "two_hands_mass": Limit("two_hands", "plant.mass_scale=%s", "1", 1.0, 0.1, 0.05),
+    "lift_mass": Limit("box_lift", "world.objects.box.mass=%s", "kg", 0.5, 0.1, 0.05),
+    "lift_low": Limit("box_lift", "world.objects.box.size.2=%s", "m", 0.12, -0.01, 0.005),
+    "lift_far": Limit("box_lift", "world.objects.box.position.0=%s", "m", 0.16, 0.01, 0.005),
     "friction_low": Limit("reach", "plant.friction=%s", "1", 0.8, -0.2, 0.05),
 }
 

@@ -10,8 +10,8 @@ import pytest
 from synthetic import FLOOR, LEFT_PALM, RIGHT_PALM, STEP, TABLE, TORSO, SyntheticRun
 
 from wbmpc.checks import settings
-from wbmpc.checks.context import LiftedObject
 from wbmpc.checks.contacts import DeclaredContactsCheck
+from wbmpc.checks.context import LiftedObject
 from wbmpc.checks.lift import ComDropCheck, ComInBandCheck, LiftedCheck
 from wbmpc.checks.result import CheckResult
 from wbmpc.signals import Vector

@@ -62,7 +62,9 @@ def test_no_plan_nearby_costs_less_when_the_middle_of_the_band_has_its_share(see
         height, velocity = PREVIEW.P_ps @ state + PREVIEW.P_pu @ jerk, PREVIEW.P_vs @ state + PREVIEW.P_vu @ jerk
         away = (1.0 - share) * np.sum((height - wanted) ** 2) + share * np.sum((height - middle) ** 2)
         return float(
-            SETTINGS.jerk_cost * jerk @ jerk + SETTINGS.velocity_cost * velocity @ velocity + SETTINGS.position_cost * away
+            SETTINGS.jerk_cost * jerk @ jerk
+            + SETTINGS.velocity_cost * velocity @ velocity
+            + SETTINGS.position_cost * away
         )
 
     best = price(plan.jerk)

@@ -70,7 +70,9 @@ def test_palms_are_raised_together_but_never_pulled_apart() -> None:
     assert left[2] > 0.5
     assert right[2] > 0.5
     assert abs(left[1] - right[1]) < 0.1
-    wider = make_tracker().solve(state(q), replace(setpoint, hand_mode=np.array([HandMode.MOVE] * 2), hand_position=moved))
+    wider = make_tracker().solve(
+        state(q), replace(setpoint, hand_mode=np.array([HandMode.MOVE] * 2), hand_position=moved)
+    )
     left, right = (palm_acceleration(q, np.zeros(ROBOT.nv), wider, side) for side in range(2))
     assert left[1] - right[1] > 0.5  # hands that hold nothing do go there
 

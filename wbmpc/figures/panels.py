@@ -71,7 +71,7 @@ def draw_balance(axes: Any, trace: Trace, axis: int) -> None:
 
 
 def draw_height(axes: Any, trace: Trace) -> None:
-    """CoM height against the band of stage 1, in time, and the height of the hands where they hold something: Fig. 4."""
+    """CoM height against the band of stage 1, in time, and the height of hands that hold something: [M] Fig. 4."""
     low, high = 100 * trace.com_height_band.T
     axes.fill_between(trace.time, low, high, color=LIMIT, alpha=0.18, lw=0, label="band of stage 1")
     axes.plot(trace.time, 100 * trace.com[:, 2], color=MEASURED, lw=2.2, label="CoM")

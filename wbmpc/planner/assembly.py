@@ -9,6 +9,7 @@ import numpy as np
 from wbmpc.planner.footstep import SoleReferences
 from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.joint_reference import JointReference
+from wbmpc.planner.lift import Lift
 from wbmpc.planner.plan import Plan
 from wbmpc.qp import QpSolution
 from wbmpc.signals import SIDES, HandMode, PlanReport, StageReport, Vector
@@ -26,6 +27,7 @@ def assemble(
     soles: SoleReferences,
     modes: list[HandMode],
     contacts: list[HandContact],
+    lift: Lift | None,
     arm_keep_out: Vector,
 ) -> Plan:
     """The plan of one snapshot.
@@ -36,6 +38,7 @@ def assemble(
         velocity: stage 2's joint velocities (nv,).
         stance: which feet stand.
         modes: of both hands.
+        lift: the one that moves them, if one does.
         arm_keep_out: (2, 3, 5) half-spaces of the arms' points; a braced or hurried arm has none.
     """
     palm_position, palm_velocity = joints.palms(velocity)
@@ -51,6 +54,10 @@ def assemble(
     for side, mode in enumerate(modes):  # a palm on its surface holds the arm, a hurried one has its way planned
         if mode == HandMode.CONTACT or contacts[side].hurried:
             arm_keep_out[side, :, 3] = -np.inf
+    urgency = np.array([float(c.hurried) for c in contacts])
+    if lift is not None:
+        lift.guard(arm_keep_out)
+        urgency[:] = lift.urgency
     return Plan(
         time=report.time,
         step=step,
@@ -71,7 +78,7 @@ def assemble(
         hand_velocity=palm_velocity,
         hand_acceleration=palm_acceleration,
         hand_jerk=palm_jerk,
-        hand_urgency=np.array([float(c.hurried) for c in contacts]),
+        hand_urgency=urgency,
         hand_force=report.contact_force[:, 0],
         hand_force_cap=caps[:, 0],
         hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / period,

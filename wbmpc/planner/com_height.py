@@ -29,9 +29,9 @@ class ComHeightStage:
                                      state outside them still has a plan), and
                 R − d ≤ C ≤ R + d    the band of [M] eq. QP1 (soft: two end-effectors may disagree).
 
-    The paper minimises the jerk alone; that drifts inside the band, hence the weak velocity and position terms. C_wanted
-    is what the postures of tasks and contacts say; a `middle_share` of the weight goes to the middle of the band instead,
-    the paper's own remark: w_p ((1 − s) |C − C_posture|² + s |C − C_middle|²), up to a constant.
+    The paper minimises the jerk alone; that drifts inside the band, hence the weak velocity and position terms.
+    C_wanted is what the postures of tasks and contacts say; a `middle_share` of the weight goes to the middle of the
+    band instead, the paper's own remark: w_p ((1 − s) |C − C_posture|² + s |C − C_middle|²), up to a constant.
     """
 
     def __init__(self, preview: Preview, settings: HeightSettings, *, backend: str) -> None:

@@ -18,6 +18,7 @@ SEARCH = 0.02  # [m] how far behind its face a palm looks for the box
 ARRIVED = 0.015  # [m] of both palms, before they close
 PATIENCE = 2.0  # [s] waited for that
 TOUCH_SPEED, TOUCHED = 0.05, 0.5  # [m/s], [N] of the closing palms
+CLOSING_URGENCY = 0.2
 RAMP = 0.3  # [s] of the squeeze, and after it of the weight
 GRIP_MARGIN, LEAST_SQUEEZE = 1.6, 5.0  # factor on the squeeze that just holds; [N]
 FELT_TIME = 0.3  # [s] time constant of the weight that is felt
@@ -92,6 +93,11 @@ class Lift:
     def mode(self) -> HandMode:
         """What the tracker does with both hands; only when active."""
         return HandMode.CARRY if self.holds else HandMode.MOVE
+
+    @property
+    def urgency(self) -> float:
+        """How much the hands may disturb the rest of the body, 0 … 1: palms that close must press."""
+        return CLOSING_URGENCY if self.phase == LiftPhase.CLOSE else 0.0
 
     @property
     def top(self) -> Vector:

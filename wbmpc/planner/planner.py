@@ -184,11 +184,6 @@ class Planner:
         if motion is None and self._last is not None:
             self._last = replace(self._last, report=report)
             return self._last
-        arm_keep_out = self._keep_out.of_arms(
-            *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
-        )
-        if self._tasks.lifting is not None:
-            self._tasks.lifting.guard(arm_keep_out)
         self._last = assemble(
             report,
             step=preview.step,
@@ -200,7 +195,10 @@ class Planner:
             soles=soles,
             modes=[mode for _, _, mode in hands],
             contacts=contacts.hands,
-            arm_keep_out=arm_keep_out,
+            lift=self._tasks.lifting,
+            arm_keep_out=self._keep_out.of_arms(
+                *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
+            ),
         )
         return self._last
 
