@@ -381,13 +381,13 @@ MISTAKES = [
     ("empty", "", "", "the file is empty, expected a mapping of scenario keys"),
     (
         "lifted object",
-        second_task("{kind: lift, object: tabel, height: 0.1, start: 7.0}"),
+        second_task("{kind: lift, object: tabel, height: 0.1, start: 9.0, reach_time: 1.0, raise_time: 1.0}"),
         "tabel",
         "tasks.1.object: no object 'tabel', did you mean 'table'?",
     ),
     (
         "fixed object lifted",
-        second_task("{kind: lift, object: table, height: 0.1, start: 7.0}"),
+        second_task("{kind: lift, object: table, height: 0.1, start: 9.0, reach_time: 1.0, raise_time: 1.0}"),
         "table, height",
         "tasks.1.object: 'table' is fixed, give it a mass (world.objects.table.mass)",
     ),

@@ -99,10 +99,8 @@ def test_geoms_options_and_absent_objects(tmp_path):
 
 def test_an_object_with_a_mass_is_free_and_the_robot_is_placed_as_before(tmp_path):
     """It falls, comes to rest and weighs what is said, times what the plant makes of it; the robot's mass does not."""
-    scenario = load(tmp_path, edited("patches:\n  right: {on: table,", "patches:\n  right: {on: desk,").replace(
-        "    table: {", "    crate: {kind: box, size: [0.1, 0.1, 0.2], position: [0.5, 0.4], bottom: 0.02, mass: 0.3}\n"
-        "    desk: {", 1,
-    ))  # fmt: skip
+    crate = "crate: {kind: box, size: [0.1, 0.1, 0.2], position: [0.5, 0.4], bottom: 0.02, mass: 0.3}"
+    scenario = load(tmp_path, edited("    table: {", f"    {crate}\n    table: {{"))
     scenario = vary(scenario, {"plant.mass_scale": 1.1, "plant.body_mass_scale": {"crate": 1.5}})
     model = model_of(scenario)
     assert model.body("crate").mass == pytest.approx(0.45)
@@ -121,9 +119,9 @@ def test_an_object_with_a_mass_is_free_and_the_robot_is_placed_as_before(tmp_pat
 
 
 def test_what_is_to_be_lifted_is_no_obstacle_and_an_absent_load_is_believed_in(tmp_path):
-    text = edited("disturbances:", "  - {kind: lift, object: crate, height: 0.1, start: 8.5, reach_time: 1.0, "
-        "raise_time: 1.0}\ndisturbances:").replace("patches:", "    crate: {kind: box, size: [0.1, 0.2, 0.3], "
-        "position: [0.2, 0.1], yaw: 0.2, mass: 0.4, present: false}\npatches:", 1)  # fmt: skip
+    crate = "crate: {kind: box, size: [0.1, 0.2, 0.3], position: [0.2, 0.1], yaw: 0.2, mass: 0.4, present: false}"
+    lift = "{kind: lift, object: crate, height: 0.1, start: 8.5, reach_time: 1.0, raise_time: 1.0}"
+    text = edited("disturbances:", f"  - {lift}\ndisturbances:").replace("    table: {", f"    {crate}\n    table: {{")
     scenario = load(tmp_path, text)
     assert len(resolve_obstacles(scenario)) == 1
     (load_,) = resolve_loads(scenario)

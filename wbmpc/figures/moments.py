@@ -23,7 +23,7 @@ def key_moments(footage: Footage, trace: Trace, count: int) -> list[float]:
     joints, the base, which hands push, and time; then it moves to the stillest moment nearby: a hold rather than the
     way to it.
     """
-    base, joints = footage.qpos[:, :3], footage.qpos[:, 7 : 7 + footage.model.nu]
+    base, joints = footage.qpos[:, :3], footage.qpos[:, 7:]
     features = np.column_stack(
         [
             joints / _POSTURE,
