@@ -18,7 +18,7 @@ from wbmpc.planner.planner import Planner
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
-from wbmpc.scenario import Scenario, build_world, resolve_loads, resolve_obstacles, resolve_patches
+from wbmpc.scenario import Scenario, build_world, resolve_ground, resolve_loads, resolve_obstacles, resolve_patches
 from wbmpc.signals import RobotState, Vector
 from wbmpc.tracker.tracker import Tracker
 
@@ -76,6 +76,7 @@ class Session:
             tasks=scenario.tasks,
             patches=resolve_patches(scenario),
             obstacles=resolve_obstacles(scenario),
+            ground=resolve_ground(scenario),
             loads=resolve_loads(scenario),
             q=q,
             period=loop.planner_period_ticks * self.step,

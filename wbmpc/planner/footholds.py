@@ -1,43 +1,72 @@
-"""Where a foot may be put and what it must clear on its way: footprints against the obstacles on the floor."""
+"""Where a foot may be put, how high that is, and what it must clear on its way there."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from wbmpc.planner.support import convex_hull, foot_corners
-from wbmpc.scenario import Obstacle
+from wbmpc.scenario import Obstacle, Tread
 from wbmpc.signals import Vector
 
 MARGIN = 0.012  # [m] kept between a sole and an obstacle
 REACH_UP = 0.10  # [m] obstacles that begin higher are not in a foot's way; those that end higher cannot be stepped over
+LEVEL = 0.002  # [m] steps up or down that are none
 CLEARANCE = 0.025  # [m] of a swing foot over what it steps over
 
 
 class Footholds:
-    """The obstacles as the feet see them."""
+    """Obstacles and treads as the feet see them; where there is neither, there is the floor."""
 
-    def __init__(self, obstacles: tuple[Obstacle, ...], half_extents: Vector) -> None:
+    def __init__(
+        self, obstacles: tuple[Obstacle, ...], half_extents: Vector, *, ground: tuple[Tread, ...] = ()
+    ) -> None:
         """`half_extents` (2,) of a sole [m]."""
+        self._ground = ground
         self._low = [o for o in obstacles if o.bottom < REACH_UP]
         self._sole, self._half = half_extents, half_extents + MARGIN
 
     def free(self, position: Vector, yaw: float) -> bool:
         """Whether a sole with its centre at `position` (2,) [m] stands clear of every obstacle."""
         sole = foot_corners(position=position, yaw=yaw, half_extents=self._half)
-        return not any(_overlap(sole, obstacle.corners) for obstacle in self._low)
+        level = self._level(sole)
+        return level is not None and not any(_overlap(sole, obstacle.corners) for obstacle in self._low)
 
-    def crossed(self, start: Vector, end: Vector, yaw: float) -> float | None:
+    def height(self, position: Vector, yaw: float, *, otherwise: float) -> float:
+        """Height of the ground [m] under a sole with its centre at `position` (2,) [m]; `otherwise` over an edge."""
+        level = self._level(foot_corners(position=position, yaw=yaw, half_extents=self._sole))
+        return otherwise if level is None else level
+
+    def _level(self, sole: Vector) -> float | None:
+        """Height [m] of the tread, or floor, that carries a sole (4, 2) [m] as a whole; None over an edge."""
+        under = [tread for tread in self._ground if _overlap(sole, tread.corners)]
+        if not under:
+            return 0.0
+        highest = max(under, key=lambda tread: tread.top)
+        return highest.top if _inside(sole, highest.corners) else None
+
+    def crossed(self, start: Vector, end: Vector, yaw: float, *, lowest: float = 0.0) -> float | None:
         """Height to lift a sole by on its straight way from `start` to `end` (2,) [m]: 0 when nothing is in the way.
+
+        `lowest` [m]: the lower one of the heights of both ends, over which the height counts.
 
         None: something is too high to step over. Where a foot has landed it may stand closer than the margin to what it
         leaves: that is no longer in its way.
         """
         sides = ((start, self._sole), (end, self._half))
         swept = convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in sides]))
-        tops = [obstacle.top for obstacle in self._low if _overlap(swept, obstacle.corners)]
+        things: list[Obstacle | Tread] = [*self._low, *self._ground]
+        tops = [thing.top - lowest for thing in things if _overlap(swept, thing.corners)]
+        tops = [top for top in tops if top > LEVEL]
         if any(top > REACH_UP for top in tops):
             return None
         return max(tops) + CLEARANCE if tops else 0.0
+
+
+def _inside(inner: Vector, outer: Vector) -> bool:
+    """Whether all points (n, 2) are in a convex polygon (k, 2), counter-clockwise."""
+    edges = np.roll(outer, -1, axis=0) - outer
+    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+    return bool((inner @ normals.T <= np.einsum("ki,ki->k", normals, outer) + 1e-9).all())
 
 
 def _overlap(a: Vector, b: Vector) -> bool:

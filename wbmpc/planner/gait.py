@@ -7,10 +7,11 @@ from enum import IntEnum
 import numpy as np
 
 from wbmpc.planner.footstep import Feet, Footstep, SoleReferences
+from wbmpc.planner.footstep_bounds import FootstepBounds
 from wbmpc.planner.settings import GaitSettings
-from wbmpc.planner.stepping import SIDE_SIGN, Stepping, turning_room
+from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.stride import Stride
-from wbmpc.planner.support import SupportPolygon
+from wbmpc.planner.support import UNEVEN, SupportPolygon
 from wbmpc.planner.support_interval import Interval, Transfer
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.swing import Swing
@@ -168,14 +169,19 @@ class Gait:
 
     # ------------------------------------------------------------------ over the horizon
 
-    def preview(self, time: float, times: Vector, *, rate: float, margin: float, growth: float) -> SupportPreview:
+    def preview(
+        self, time: float, times: Vector, *, rate: float, margin: float, growth: float, com: Vector
+    ) -> SupportPreview:
         """Support over the horizon.
+
+        Where soles stand at different heights all polygons are projected onto the plane of the feet that stand now.
 
         Args:
             time: now [s].
             times: (N,) knots [s from now].
             rate: at which the present phase goes on (0 … 1).
             margin: inset of the polygons [m], growing by `growth` [m/s].
+            com: (N, 3) where the CoM will be [m], roughly.
         """
         intervals, steps = self._intervals(time, float(times[-1]), rate)
         n, m = len(times), MAX_FOOTSTEPS
@@ -184,13 +190,17 @@ class Gait:
         polygons: list[SupportPolygon] = []
         centring = np.zeros(n)
         made: dict[int, SupportPolygon] = {}  # of the intervals that have one for all their knots
+        plane = self._plane(intervals)
         which = 0
         for k, t in enumerate(times):
             while which < len(intervals) - 1 and t > intervals[which].end + 1e-9:
                 which += 1
             interval = intervals[which]
             moving = interval.weights(t) is not None
-            if moving or which not in made:
+            if plane is not None:
+                view = (plane, com[k])
+                polygon = interval.polygon(t, half_extents=self._half_extents, margin=margin, onto=view)
+            elif moving or which not in made:
                 polygon = interval.polygon(t, half_extents=self._half_extents, margin=margin)
                 if not moving:
                     made[which] = polygon
@@ -204,8 +214,13 @@ class Gait:
         last = intervals[which]
         both = last if last.swing < 0 else intervals[min(which + 1, len(intervals) - 1)]
         at_rest = Interval(NEVER, both.feet, -1, both.moved)
-        rest = at_rest.polygon(0.0, half_extents=self._half_extents, margin=margin + growth * float(times[-1]))
-        lower, upper, axes, placement_lower, placement_upper, places = self._bounds(steps)
+        rest = at_rest.polygon(
+            0.0,
+            half_extents=self._half_extents,
+            margin=margin + growth * float(times[-1]),
+            onto=None if plane is None else (plane, com[-1]),
+        )
+        bounds = FootstepBounds.of(self._settings, self.feet, steps, swing=self.swing, left=self._left)
         return SupportPreview(
             normals=np.array([p.normals for p in polygons]),
             offsets=np.array([p.offsets for p in polygons]),
@@ -216,15 +231,21 @@ class Gait:
             rest_normals=rest.normals,
             rest_offsets=rest.offsets,
             rest_shift=at_rest.shares(0.0, m),
-            footsteps=places,
-            placement_axes=axes,
-            placement_lower=placement_lower,
-            placement_upper=placement_upper,
-            lower=lower,
-            upper=upper,
+            footsteps=bounds.footsteps,
+            placement_axes=bounds.placement_axes,
+            placement_lower=bounds.placement_lower,
+            placement_upper=bounds.placement_upper,
+            lower=bounds.lower,
+            upper=bounds.upper,
             com_reference=com_reference,
             com_velocity=com_velocity,
         )
+
+    def _plane(self, intervals: list[Interval]) -> float | None:
+        """Height of the plane of the feet that stand now [m] if all others are not as high; None on level ground."""
+        plane = float(np.mean([self.feet.positions[side][2] for side in range(2) if self.stance[side]]))
+        heights = np.array([interval.feet.positions[:, 2] for interval in intervals])
+        return plane if np.abs(heights - plane).max() > UNEVEN else None
 
     def goal_polygon(self, margin: float) -> SupportPolygon:
         """What carries the robot where its task ends: the stance foot when a foot is put somewhere, else both feet."""
@@ -271,30 +292,3 @@ class Gait:
                 end += step.swing_time
         intervals.append(Interval(NEVER, feet, -1, moved))
         return intervals, steps
-
-    def _bounds(self, steps: list[Footstep]) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
-        """Where stage 2 may move the footsteps: each beside the foot that stands, the present one within reach."""
-        settings, m = self._settings, MAX_FOOTSTEPS
-        lower, upper, places = np.zeros((m, 2)), np.zeros((m, 2)), np.zeros((m, 2))
-        axes = np.tile(np.eye(2), (m, 1, 1))
-        placement_lower, placement_upper = np.full((m, 2), -np.inf), np.full((m, 2), np.inf)
-        feet = self.feet
-        for j, step in enumerate(steps):
-            places[j] = step.position[:2]
-            stance = 1 - step.side
-            c, s = np.cos(feet.yaws[stance]), np.sin(feet.yaws[stance])
-            axes[j] = [[c, s], [-s, c]]
-            nominal = axes[j] @ (step.position - feet.positions[stance])[:2]
-            if step.adaptable and settings.adapt_footsteps:
-                narrowest = settings.narrowest + turning_room(settings, step.yaw - float(feet.yaws[stance]))
-                widths = sorted((SIDE_SIGN[step.side] * narrowest, SIDE_SIGN[step.side] * settings.widest))
-                low, high = np.array([-settings.longest, widths[0]]), np.array([settings.longest, widths[1]])
-                placement_lower[j] = np.minimum(low, nominal) - nominal
-                placement_upper[j] = np.maximum(high, nominal) - nominal
-                lower[j], upper[j] = -0.3, 0.3
-            feet = feet.after(step)
-        if self.swing is not None and self.swing.step.adaptable and settings.adapt_footsteps:
-            reach = settings.foot_speed * self._left
-            offset = self.swing.target[:2] - self.swing.step.position[:2]
-            lower[0], upper[0] = offset - reach, offset + reach
-        return lower, upper, axes, placement_lower, placement_upper, places

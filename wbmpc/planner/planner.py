@@ -30,7 +30,7 @@ from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
 from wbmpc.planner.zmp_model import free_model, loaded_model
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
-from wbmpc.scenario import Load, Obstacle, PatchPose, Task
+from wbmpc.scenario import Load, Obstacle, PatchPose, Task, Tread
 from wbmpc.signals import HandMode, PlanReport, RobotState, Vector
 
 GATE_TIME = 0.4  # [s] in which the steps' clock is stopped, and set going again
@@ -57,6 +57,7 @@ class Planner:
         tasks: tuple[Task, ...],
         patches: tuple[PatchPose, ...],
         obstacles: tuple[Obstacle, ...] = (),
+        ground: tuple[Tread, ...] = (),
         loads: tuple[Load, ...] = (),
         q: Vector,
         period: float,
@@ -71,7 +72,7 @@ class Planner:
             for ask in (True, False)
         )
         measured = self._measured = Snapshot(robot, q)
-        stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents))
+        stepping = Stepping(tasks, settings.gait, Footholds(obstacles, robot.sole_half_extents, ground=ground))
         self._gait = Gait(settings.gait, stepping, feet=measured.feet, half_extents=robot.sole_half_extents)
         self._asked: Feet | None = None  # the feet from which the present stride goes
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
@@ -286,12 +287,17 @@ class Planner:
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
         margin = self._com.inset(walking=gait.walking)
 
+        com = np.tile(self._com.value[:, 0], (self._preview.steps, 1))
+        if self._last is not None and np.isfinite(self._last.report.com).all():
+            com = self._last.report.com
+
         def preview(rate: float, margin: float) -> SupportPreview:
             return gait.preview(
                 *(time, self._preview.times),
                 rate=rate,
                 margin=margin,
                 growth=settings.zmp_margin_growth,
+                com=com,
             )
 
         judged = preview(1.0, settings.zmp_margin)

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wbmpc.kinematics import Kinematics
+from wbmpc.planner.support import UNEVEN
 from wbmpc.robot import Robot
 from wbmpc.rotations import cross, heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
@@ -130,7 +131,7 @@ class Posture:
             g += self._com_cost * (J.T @ (centre - self.com[:2]))
             J = kinematics.com_jacobian[2]
             H += HEIGHT_COST * np.outer(J, J)
-            g += HEIGHT_COST * (self._height - self.com[2]) * J
+            g += HEIGHT_COST * (self._height + _level(soles) - self.com[2]) * J
             if self._tilt_cost:
                 self._add_tilt(H, g)
             diagonal = H.reshape(-1)[:: nv + 1]
@@ -156,6 +157,7 @@ class Posture:
         """The nominal posture (nq,) over the feet: from afar the way there ends in a contorted optimum."""
         q, turn = self._nominal.copy(), level_frame(float(yaws.mean()))
         q[:2] = soles[:, :2].mean(axis=0) + turn[:2, :2] @ self._base_offset
+        q[2] += _level(soles)
         q[3:7] = (pin.Quaternion(turn) * pin.Quaternion(q[3:7])).coeffs()
         return q
 
@@ -193,3 +195,8 @@ class Posture:
                 row = target.normal @ (kinematics.jacobian(elbow)[:3] - J)
                 H += ELBOW_COST * np.outer(row, row)
                 g += ELBOW_COST * excess * row
+
+
+def _level(soles: Vector) -> float:
+    """Mean height [m] of soles (2, 3) off the floor; 0 where they stand on it, as well as that is known."""
+    return float(soles[:, 2].mean()) if np.abs(soles[:, 2]).max() > UNEVEN else 0.0

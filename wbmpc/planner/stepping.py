@@ -7,6 +7,7 @@ import numpy as np
 from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.settings import GaitSettings
+from wbmpc.planner.support import UNEVEN
 from wbmpc.rotations import angle_difference
 from wbmpc.scenario import GoTask, StepTask, Task, WalkTask
 from wbmpc.signals import Vector
@@ -67,7 +68,7 @@ class Stepping:
         settings, stance_yaw = self._settings, float(feet.yaws[1 - side])
         return Footstep(
             side=side,
-            position=np.array([*task.target, feet.positions[1 - side][2]]),
+            position=self._on_ground(np.array(task.target), float(task.yaw), feet, side),
             yaw=stance_yaw + angle_difference(task.yaw, stance_yaw),  # not around by whole turns
             swing_time=task.duration,
             double_support=settings.stride_double_support,
@@ -102,22 +103,26 @@ class Stepping:
         def place(ahead: float) -> Vector:
             return stance + turn @ np.array([ahead, wanted[1]])
 
-        nominal = self._footholds.crossed(start, place(wanted[0]), yaw)
+        def lift(end: Vector) -> float | None:
+            heights = feet.positions[side][2], self._on_ground(end, yaw, feet, side)[2]
+            return self._footholds.crossed(start, end, yaw, lowest=float(min(heights)))
+
+        nominal = lift(place(wanted[0]))
         if nominal == 0.0 and self._footholds.free(place(wanted[0]), yaw):
             ahead = wanted[0]
         else:  # something is in the way: the first place beyond it, or the last one before
             tries = np.arange(0.0, abs(way) + 1e-9, SEARCH_STEP) * forward
-            beyond = [a for a in tries if self._over(start, place(a), yaw) and self._footholds.free(place(a), yaw)]
-            before = [a for a in tries if self._footholds.crossed(start, place(a), yaw) == 0.0]
+            beyond = [a for a in tries if lift(place(a)) and self._footholds.free(place(a), yaw)]
+            before = [a for a in tries if lift(place(a)) == 0.0]
             if not beyond and not before:
                 return None
             ahead = beyond[0] if beyond else before[-1]
             if not beyond and abs((turn.T @ (place(ahead) - start))[0]) < SEARCH_STEP and _aligned(feet):
                 return None  # no way on from here
-        height = self._footholds.crossed(start, place(ahead), yaw) or 0.0
+        height = lift(place(ahead)) or 0.0
         return Footstep(
             side=side,
-            position=np.array([*place(ahead), feet.positions[1 - side][2]]),
+            position=self._on_ground(place(ahead), yaw, feet, side),
             yaw=yaw,
             swing_time=task.swing_time,
             double_support=settings.stride_double_support,
@@ -127,9 +132,11 @@ class Stepping:
             task=index,
         )
 
-    def _over(self, start: Vector, end: Vector, yaw: float) -> bool:
-        height = self._footholds.crossed(start, end, yaw)
-        return height is not None and height > 0.0
+    def _on_ground(self, place: Vector, yaw: float, feet: Feet, side: int) -> Vector:
+        """(3,) [m] a sole's centre at `place` (2,); over an edge, as high as the foot that stands."""
+        stance = float(feet.positions[1 - side][2])
+        level = self._footholds.height(place, yaw, otherwise=stance)
+        return np.array([*place, stance if abs(level - stance) < UNEVEN else level])
 
     def _walk(self, feet: Feet, command: Vector) -> Footstep | None:
         settings = self._settings

@@ -9,6 +9,7 @@ import numpy as np
 from wbmpc.signals import Vector
 
 PROJECTIONS = 20
+UNEVEN = 0.005  # [m] smaller differences of two soles' heights are the estimate's
 MAX_EDGES = 8  # two rectangles have a hull of at most eight edges
 
 

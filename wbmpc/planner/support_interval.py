@@ -59,20 +59,31 @@ class Interval:
         left, right = (a + share * (b - a) for a, b in zip(transfer.before, transfer.after, strict=True))
         return left, right
 
-    def polygon(self, time: float, *, half_extents: Vector, margin: float) -> SupportPolygon:
-        """Where the ZMP may be at `time` [s from now]; soles of `half_extents` (2,) [m], inset by `margin` [m]."""
+    def polygon(
+        self, time: float, *, half_extents: Vector, margin: float, onto: tuple[float, Vector] | None = None
+    ) -> SupportPolygon:
+        """Where the ZMP may be at `time` [s from now]; soles of `half_extents` (2,) [m], inset by `margin` [m].
+
+        `onto`: height of a plane [m] and where the CoM (3,) is [m]. Without angular momentum a force goes through the
+        CoM, and meets the plane where the line from its point of contact does (Caron et al. 2017); None: each sole seen
+        from above, on the plane of their mean height.
+        """
         positions, yaws = self.feet.positions, self.feet.yaws
         corners = [
             foot_corners(position=p, yaw=float(y), half_extents=half_extents)
             for p, y in zip(positions, yaws, strict=True)
         ]
+        if onto is not None:
+            plane, com = onto
+            for side, sole in enumerate(corners):
+                sole[:] = com[:2] + (sole - com[:2]) * (com[2] - plane) / (com[2] - positions[side][2])
         weights = self.weights(time)
         if weights is None:
             points = np.vstack([corners[side] for side in self.standing])
         else:
             left, right = (weight * sole for weight, sole in zip(weights, corners, strict=True))
             points = (left[:, None] + right[None]).reshape(-1, 2)
-        plane = float(positions[self.standing, 2].mean())
+        plane = float(positions[self.standing, 2].mean()) if onto is None else onto[0]
         return SupportPolygon.of_corners(points, margin=margin, plane_height=plane)
 
     def shares(self, time: float, count: int) -> Vector:

@@ -1,6 +1,7 @@
 """Scenarios: YAML files -> typed, strict, located settings -> the MuJoCo world of a run."""
 
 from wbmpc.scenario.consistency import check_names
+from wbmpc.scenario.ground import Tread, resolve_ground
 from wbmpc.scenario.json_schema import scenario_json_schema
 from wbmpc.scenario.load import counterfactual, load_scenario, robot_path, vary
 from wbmpc.scenario.loads import Load, resolve_loads
@@ -55,6 +56,7 @@ __all__ = [
     "StepTask",
     "Sweep",
     "Task",
+    "Tread",
     "Variation",
     "VelocityCommand",
     "WalkTask",
@@ -65,6 +67,7 @@ __all__ = [
     "counterfactual",
     "load_scenario",
     "parse_overrides",
+    "resolve_ground",
     "resolve_loads",
     "resolve_obstacles",
     "resolve_patches",

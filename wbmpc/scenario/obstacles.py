@@ -8,6 +8,7 @@ import numpy as np
 
 from wbmpc.scenario.schema.scenario import Scenario
 from wbmpc.scenario.schema.tasks import LiftTask
+from wbmpc.scenario.schema.world import Box
 from wbmpc.signals import Vector
 
 
@@ -31,7 +32,7 @@ def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
             centre=np.array(box.centre),
             half=np.array(box.size) / 2,
             yaw=box.yaw,
-            corners=_corners(np.array(box.position), np.array(box.size[:2]) / 2, box.yaw),
+            corners=footprint(box),
             bottom=box.bottom,
             top=box.bottom + box.size[2],
         )
@@ -40,7 +41,8 @@ def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
     )
 
 
-def _corners(centre: Vector, half: Vector, yaw: float) -> Vector:
+def footprint(box: Box) -> Vector:
+    """Corners (4, 2) [m] of a box seen from above, in world, counter-clockwise."""
     signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], dtype=float)
-    c, s = np.cos(yaw), np.sin(yaw)
-    return centre + (signs * half) @ np.array([[c, s], [-s, c]])
+    c, s = np.cos(box.yaw), np.sin(box.yaw)
+    return np.array(box.position) + (signs * np.array(box.size[:2]) / 2) @ np.array([[c, s], [-s, c]])
