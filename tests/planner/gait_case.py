@@ -111,4 +111,5 @@ class IdealGait:
         return SupportPolygon.of_corners(np.vstack(corners), margin=margin, plane_height=0.0)
 
     def preview(self, times: Vector, *, rate: float = 1.0, margin: float = 0.0, growth: float = 0.0) -> SupportPreview:
-        return self.gait.preview(self.time, times, rate=rate, margin=margin, growth=growth)
+        com = np.tile([*self.gait.feet.positions[:, :2].mean(axis=0), 0.25], (len(times), 1))
+        return self.gait.preview(self.time, times, rate=rate, margin=margin, growth=growth, com=com)

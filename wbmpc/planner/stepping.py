@@ -15,6 +15,7 @@ from wbmpc.signals import Vector
 ALIGNED, ALIGNED_YAW = 0.02, 0.06  # [m], [rad] feet so close to side by side need no further step
 STILL = 1e-6  # [m/s, rad/s] a command below is to stand
 SIDE_SIGN = (1.0, -1.0)  # left is +y
+WORTH_A_STEP = 0.02  # [m] a foot that gets so much farther has moved
 SEARCH_STEP = 0.005  # [m] between the places that are tried for a foot
 CAREFUL_LEAD = 0.3  # of a slow step: the foot rises, goes over, comes down
 
@@ -116,7 +117,11 @@ class Stepping:
             before = [a for a in tries if lift(place(a)) == 0.0]
             if not beyond and not before:
                 return None
+            near = [a for a in before if self._footholds.free(place(a), yaw)]
+            closer = bool(near) and abs((turn.T @ (place(near[-1]) - start))[0]) > WORTH_A_STEP
             ahead = beyond[0] if beyond else before[-1]
+            if beyond and closer and abs(beyond[0]) > task.step_length:
+                ahead = near[-1]  # up to the edge first: the stride over it is shorter then
             if not beyond and abs((turn.T @ (place(ahead) - start))[0]) < SEARCH_STEP and _aligned(feet):
                 return None  # no way on from here
         height = lift(place(ahead)) or 0.0
