@@ -6,6 +6,9 @@ import numpy as np
 
 from wbmpc.signals import Vector
 
+UP = np.array([0.0, 0.0, 1.0])  # in world
+UP.setflags(write=False)
+
 
 def cross(a: Vector, b: Vector) -> Vector:
     """a × b for vectors (3,); several times faster than numpy's general one, which the 1 kHz loop would feel."""

@@ -72,6 +72,7 @@ class SyntheticRun:
             SimpleNamespace(
                 time=time,
                 contact_patch=(left[0], right[0]),
+                com_height_band=np.array([[0.16, 0.275]]),
                 contact_phase=np.array([left[1], right[1]]),
                 stage1=stages[0],
                 stage2=stages[1],

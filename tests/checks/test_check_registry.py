@@ -42,6 +42,9 @@ def test_every_kind_can_be_evaluated_and_answers_under_its_name() -> None:
         settings.BothHands(kind="both_hands", min=0.1, hold=0.2),
         settings.HandImpact(kind="hand_impact", max=1.5),
         settings.HandForceCaps(kind="hand_force_caps", margin=1.0),
+        settings.Lifted(kind="lifted"),
+        settings.ComDrop(kind="com_drop"),
+        settings.ComInBand(kind="com_in_band"),
         settings.HandsFreeAtEnd(kind="hands_free_at_end"),
     ]
     results = evaluate_checks(run.context(), universal=settings.UniversalSettings(), checks=checks)
@@ -49,8 +52,8 @@ def test_every_kind_can_be_evaluated_and_answers_under_its_name() -> None:
     universal = results[: len(settings.UniversalSettings.model_fields)]
     assert all(result.passed for result in universal)
     failing = {result.name for result in results if not result.passed}
-    of_motion = {"footsteps", "travelled", "arrived", "foot_moved", "com_outside_stance"}
-    of_hands = {"reach", "brace_force", "contact_sequence", "both_hands"}
+    of_motion = {"footsteps", "travelled", "arrived", "foot_moved", "com_outside_stance", "com_drop"}
+    of_hands = {"reach", "brace_force", "contact_sequence", "both_hands", "lifted"}
     assert failing == {"com_beyond_toes", "com_height", "push_recovery"} | of_motion | of_hands
 
 

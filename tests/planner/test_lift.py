@@ -109,10 +109,10 @@ def test_the_weight_is_felt_and_the_grip_is_never_loosened_below_what_was_told(m
     forces = bench.lift.forces(np.zeros(1))[:, 0]
     assert_allclose(-forces[:, 2].sum(), mass * GRAVITY, rtol=1e-3)
     needed = 0.5 * max(mass, told) * GRAVITY / TASK.friction
-    assert float(forces[0] @ bench.lift.normals[0]) > 1.5 * needed
+    assert float(forces[0] @ bench.lift.normals[0]) > 1.35 * needed
 
 
-@pytest.mark.parametrize("seconds", [0.8, 1.4, 2.4, 2.9, 3.5])
+@pytest.mark.parametrize("seconds", [0.8, 1.4, 2.1, 2.9, 3.8])
 def test_the_preview_is_what_the_reference_will_be(seconds: float) -> None:
     bench = Bench().run(seconds)
     phase, ahead = bench.lift.phase, np.array([0.0, 0.05, 0.1])
@@ -123,7 +123,7 @@ def test_the_preview_is_what_the_reference_will_be(seconds: float) -> None:
         velocity = np.array([bench.lift.reference(side)[1] for side in range(2)])
         bench.step()
         if bench.lift.phase != phase:
-            pytest.skip("a phase ended in between")
+            pytest.fail("a phase ended in between")
         if phase in (LiftPhase.REACH, LiftPhase.RAISE):
             now = np.array([bench.lift.reference(side)[0] for side in range(2)])
             assert_allclose((now - seen[-1]) / DT, velocity, atol=0.02)

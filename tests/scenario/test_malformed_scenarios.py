@@ -406,6 +406,36 @@ MISTAKES = [
         "tasks.0: ends at 8.5 s, but tasks.1 (lift) takes both hands from 7 s on",
     ),
     (
+        "lift with steps",
+        second_task("{kind: lift, object: crate, height: 0.1, start: 8.6, reach_time: 1.0, raise_time: 1.0}")
+        .replace(
+            "patches:", "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\npatches:", 1
+        )
+        .replace("disturbances:", "  - {kind: go, target: [1.0, 0.0], start: 9.0}\ndisturbances:", 1),
+        "{kind: go",
+        "tasks.2: the feet stay where they are beside tasks.1 (lift)",
+    ),
+    (
+        "lift with a height of its own",
+        second_task("{kind: lift, object: crate, height: 0.1, start: 8.6, reach_time: 1.0, raise_time: 1.0}")
+        .replace(
+            "patches:", "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\npatches:", 1
+        )
+        .replace("disturbances:", "  - {kind: com_height, waypoints: [{time: 1.0, height: 0.25}]}\ndisturbances:", 1),
+        "{kind: com_height",
+        "tasks.2: tasks.1 (lift) has a CoM height of its own",
+    ),
+    (
+        "ground that gives way",
+        edited("friction: 0.9}", "friction: 0.9, walkable: true}").replace(
+            "patches:",
+            "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2, walkable: true}\npatches:",
+            1,
+        ),
+        "true}\npatches",
+        "world.objects.crate.walkable: 'crate' has a mass, it gives way: no foot can stand on it",
+    ),
+    (
         "weightless",
         edited("friction: 0.9}", "friction: 0.9, mass: 0.0}"),
         "0.0}",

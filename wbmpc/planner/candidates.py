@@ -31,7 +31,7 @@ class Candidate:
     patch: PatchPose
     hand: int
     posture: Posture
-    excluded: bool = False  # it was chosen before and the contact did not appear
+    excluded: bool = False  # it was chosen before, and is not to be again
     tries: int = 0  # how often the palm did not get there
     current: bool = False  # its posture has been iterated for the feet as they stand
 
@@ -41,7 +41,10 @@ class Candidate:
         return self.current and self.posture.settled
 
     def gave_up(self, outcome: str) -> None:
-        """Its contact was not made. From elsewhere the palm may find a way, where there is nothing it finds nothing."""
+        """Its contact was not made: `outcome` is `HandContact.advance`'s.
+
+        From elsewhere a palm may find a way to the patch; where there is nothing it will find nothing.
+        """
         self.tries += 1
         self.excluded = outcome == "missing" or self.tries >= MOST_TRIES
 
@@ -228,7 +231,7 @@ class Candidates:
             elif not free_hands[candidate.hand]:
                 reasons[key] = "hand is in use"
             elif candidate.excluded:
-                reasons[key] = "tried before, nothing was there"
+                reasons[key] = "tried before, in vain"
             elif slack < 0.0:
                 reasons[key] = f"unreachable by {-100.0 * slack:.1f} cm"
             elif (

@@ -211,9 +211,8 @@ class Contacts:
                 self._review(knots)
                 if self._short and any(free) and self._hopeless < GIVE_UP_TIME:
                     reports, stage = self._fire(knots, palms=palms, free=free, polygon=polygon, events=events)
-            if any(c.phase == ContactPhase.RELEASED for c in self.hands):
-                pass  # once it is back a hand may be of help
-            elif not self._committed or self._short:
+            returning = any(c.phase == ContactPhase.RELEASED for c in self.hands)  # a hand that is back may be of help
+            if (not self._committed or self._short) and not returning:
                 self._hopeless += self._period
             elif self._hopeless < GIVE_UP_TIME:
                 self._hopeless = 0.0

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
 
 from wbmpc.planner.hand_path import HandPath, minimum_jerk
-from wbmpc.rotations import level_frame
+from wbmpc.rotations import UP, level_frame
 from wbmpc.scenario import Load
 from wbmpc.signals import GRAVITY, HandMode, Vector
 
@@ -18,12 +19,11 @@ SEARCH = 0.02  # [m] how far behind its face a palm looks for the box
 ARRIVED = 0.015  # [m] of both palms, before they close
 PATIENCE = 2.0  # [s] waited for that
 TOUCH_SPEED, TOUCHED = 0.05, 0.5  # [m/s], [N] of the closing palms
-CLOSING_URGENCY = 0.2
+CLOSING_URGENCY = 0.2  # of palms that close, 0 … 1: against the elbows' half-spaces they would hardly touch
 RAMP = 0.3  # [s] of the squeeze, and after it of the weight
-GRIP_MARGIN, LEAST_SQUEEZE = 1.6, 5.0  # factor on the squeeze that just holds; [N]
+GRIP_MARGIN, LEAST_SQUEEZE = 1.4, 5.0  # factor on the squeeze that just holds; [N]
 FELT_TIME = 0.3  # [s] time constant of the weight that is felt
 LOST_FORCE, LOST_TIME = 0.3, 0.1  # [N], [s] a palm without force for so long has lost the box
-UP = np.array([0.0, 0.0, 1.0])
 
 
 class LiftPhase(IntEnum):
@@ -168,6 +168,7 @@ class Lift:
         pressed = np.einsum("si,si->s", palm_forces, self.normals)  # (2,) [N]
         phase = self.phase
         if phase == LiftPhase.WAIT and time >= self.task.start - 1e-9:
+            self._paths = [replace(path, start=palm.copy()) for path, palm in zip(self._paths, palms, strict=True)]
             self._enter(LiftPhase.REACH)
         elif phase in (LiftPhase.REACH, LiftPhase.RAISE, LiftPhase.GIVE_UP):
             self.sigma = float(np.clip(self.sigma + self._rate * dt, 0.0, 1.0))
@@ -191,8 +192,7 @@ class Lift:
         elif phase == LiftPhase.RAISE and self.sigma >= 1.0:
             self._enter(LiftPhase.CARRY)
         elif phase == LiftPhase.GIVE_UP:
-            for side, home in enumerate(homes):
-                self._paths[side] = HandPath(start=home.copy(), end=self._paths[side].end, away=self.normals[side])
+            self._paths = [replace(path, start=home.copy()) for path, home in zip(self._paths, homes, strict=True)]
             if self.sigma <= 0.0:
                 self._enter(LiftPhase.DONE)
         if self.holds:

@@ -10,7 +10,7 @@ import pinocchio as pin
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.support import UNEVEN
 from wbmpc.robot import Robot
-from wbmpc.rotations import cross, heading_of, level_frame, rotation_error
+from wbmpc.rotations import UP, cross, heading_of, level_frame, rotation_error
 from wbmpc.signals import Vector
 
 SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 2e-3
@@ -20,7 +20,6 @@ STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 PATIENCE = 60  # iterations for the same targets; what has not converged by then is out of reach
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
 SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets are in reach
-UP = np.array([0.0, 0.0, 1.0])
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
@@ -34,7 +33,7 @@ class PalmTarget:
 
 class Posture:
     """Damped Gauss-Newton on  1e4 Σ|sole error|² + 1e3 Σ|palm error|² + 3e2 Σ(elbow too low)²
-    + w |c_xy − centre|² + 3 (c_z − nominal)² + 2e-3 |posture error|².
+    + w |c_xy − centre|² + 3 (c_z − nominal)² + 2e-3 |posture error|² + w_t |tilt of the torso|².
 
     The solution is the posture that needs the least CoM displacement; its CoM tells stage 2 how far a hand may be from
     the CoM (d of the paper), its palm residual whether a place is reachable at all. A few iterations per plan, warm
@@ -42,7 +41,10 @@ class Posture:
     """
 
     def __init__(self, robot: Robot, *, nominal: Vector, com_cost: float, tilt_cost: float = 0.0) -> None:
-        """`nominal` (nq,): posture to deviate from as little as possible, and the start; `com_cost`: w [cost / m²]."""
+        """Start from `nominal` (nq,), the posture to deviate from as little as possible.
+
+        `com_cost`: w [cost / m²]; `tilt_cost`: w_t [cost / rad²].
+        """
         self._robot, self._nominal, self._com_cost = robot, nominal, com_cost
         self._tilt_cost = tilt_cost
         self._kinematics = Kinematics(robot)

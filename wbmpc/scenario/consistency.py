@@ -95,6 +95,11 @@ def _lifted_objects(scenario: Scenario) -> Iterator[Finding]:
             yield from _must_exist(path, task.object, objects, "object")
         elif objects[task.object].mass is None:
             yield Finding(path, f"'{task.object}' is fixed, give it a mass (world.objects.{task.object}.mass)")
+    for name, box in objects.items():
+        if box.walkable and box.mass is not None:
+            yield Finding(
+                ("world", "objects", name, "walkable"), f"'{name}' has a mass, it gives way: no foot can stand on it"
+            )
     for name, patch in scenario.patches.items():
         if patch.on in objects and objects[patch.on].mass is not None:
             yield Finding(("patches", name, "on"), f"'{patch.on}' has a mass, it gives way: no hand can brace on it")

@@ -67,7 +67,7 @@ def _leans(tasks: Iterable[Task]) -> Iterator[Finding]:
 
 
 def _lifts(tasks: Iterable[Task]) -> Iterator[Finding]:
-    """A lift takes both hands and never lets go: nothing that moves hands or CoM comes at the same time or after it."""
+    """A lift takes both hands and never lets go: it comes after all that moves hands or CoM, and the feet stay."""
     lifts = [(index, task) for index, task in enumerate(tasks) if isinstance(task, LiftTask)]
     for index, _ in lifts[1:]:
         yield Finding(("tasks", index), f"a second lift task, first is tasks.{lifts[0][0]}")
@@ -75,6 +75,10 @@ def _lifts(tasks: Iterable[Task]) -> Iterator[Finding]:
         if isinstance(task, ExcursionTask) and task.end > lift.start:
             message = f"ends at {task.end:g} s, but tasks.{first} (lift) takes both hands from {lift.start:g} s on"
             yield Finding(("tasks", index), message)
+        elif isinstance(task, ComHeightTask):
+            yield Finding(("tasks", index), f"tasks.{first} (lift) has a CoM height of its own")
+        elif isinstance(task, FootworkTask):
+            yield Finding(("tasks", index), f"the feet stay where they are beside tasks.{first} (lift)")
 
 
 def _footwork(tasks: Iterable[Task]) -> Iterator[Finding]:

@@ -145,12 +145,11 @@ class TaskStack:
         """Both palms follow their paths, but for how far they are apart: that is the held thing's to say."""
         s, frames = self._settings, self._robot.palm_frames
         rows = slice(HANDS.start + 3 * side, HANDS.start + 3 * side + 3)
-        palms = [kinematics.position(frame) for frame in frames]
-        across = palms[0] - palms[1]
-        across /= np.sqrt(across @ across)
-        errors = [setpoint.hand_position[i] - palms[i] for i in range(2)]
-        apart = 0.5 * float((errors[0] - errors[1]) @ across)
-        error = errors[side] - (apart if side == 0 else -apart) * across
+        own, other = kinematics.position(frames[side]), kinematics.position(frames[1 - side])
+        across = own - other
+        error = setpoint.hand_position[side] - own
+        apart = error - setpoint.hand_position[1 - side] + other
+        error -= (0.5 * float(apart @ across) / float(across @ across)) * across
         self.weight[rows] = s.carry_weight
         self.target[rows] = s.hand_stiffness * error + s.hand_damping * (setpoint.hand_velocity[side] - velocity)
         self.target[rows] += setpoint.hand_acceleration[side] - kinematics.drift(frames[side])[:3]

@@ -27,6 +27,7 @@ from wbmpc.tracker.settings import TrackerSettings
 from wbmpc.tracker.tasks import CARRY, CONTACT, TaskStack
 
 FORCES = 18  # two sole wrenches (6 each), then two palm forces (3 each), each in its contact's own frame
+WORLD = np.eye(3)  # rotation of a force that is given in world
 SENSED_SHARE = 0.2  # per tick, of the filtered palm force
 FRICTION_SPEED = 0.1  # [rad/s] wanted speed from which a joint's dry friction is fully compensated
 TORQUE_SLACK_COST = 1e4  # [cost / (N·m)²]; what a violated row would ask is clipped by the servo's limit anyway
@@ -172,7 +173,7 @@ class Tracker:
                 lower[6 * side + 2] = 0.0
             palm = slice(12 + 3 * side, 15 + 3 * side)
             if int(setpoint.hand_mode[side]) == CARRY:  # the held thing's force is known
-                self._contact_rotation[2 + side] = np.eye(3)
+                self._contact_rotation[2 + side] = WORLD
                 self._contact_jacobian[palm] = self._tasks.matrix[21 + 3 * side : 24 + 3 * side]
                 lower[palm] = upper[palm] = setpoint.hand_force[side]
                 first = self._palm_rows.start + side * PALM_ROWS
