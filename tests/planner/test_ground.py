@@ -96,7 +96,7 @@ def test_a_journey_over_stairs_puts_every_sole_on_one_tread(rise: float, depth: 
     assert highest == pytest.approx(4 * rise)
     assert feet.positions[:, 0].mean() == pytest.approx(end, abs=0.02)
     assert_allclose(feet.positions[:, 2], 0.0)
-    assert steps < 35
+    assert steps < 45  # of 3.5 cm on average, each foot
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -287,18 +287,13 @@ class Planner:
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
         margin = self._com.inset(walking=gait.walking)
 
-        com = np.tile(self._com.value[:, 0], (self._preview.steps, 1))
-        if self._last is not None and np.isfinite(self._last.report.com).all():
-            com = self._last.report.com
+        times, growth = self._preview.times, settings.zmp_margin_growth
+        com = self._last.report.com if self._last is not None else np.full((len(times), 3), np.nan)
+        if not np.isfinite(com).all():
+            com = np.tile(self._com.value[:, 0], (len(times), 1))
 
         def preview(rate: float, margin: float) -> SupportPreview:
-            return gait.preview(
-                *(time, self._preview.times),
-                rate=rate,
-                margin=margin,
-                growth=settings.zmp_margin_growth,
-                com=com,
-            )
+            return gait.preview(time, times, rate=rate, margin=margin, growth=growth, com=com)
 
         judged = preview(1.0, settings.zmp_margin)
         return judged, judged if self._gate >= 1.0 and not alarm else preview(self._gate, margin)
