@@ -95,6 +95,7 @@ class Gait:
         dt: float,
         *,
         rate: float,
+        stay: bool = False,
         soles: Vector,
         yaws: Vector,
         loads: Vector,
@@ -104,13 +105,14 @@ class Gait:
         """Move the clock on by dt [s] at `rate` (0 … 1: the gate).
 
         Args:
+            stay: begin no steps while standing.
             soles, yaws: measured (2, 3) [m], (2,) [rad]: a foot stands where it has landed.
             loads: (2,) measured vertical forces [N].
             zmp: (2,) measured centre of the feet's pressure [m]: a stride waits until it is in the sole that stays.
         """
         settings = self._settings
         if self.phase != SupportPhase.SINGLE:
-            wanted = self._stepping.next(self.feet, time)
+            wanted = None if stay and self.step is None else self._stepping.next(self.feet, time)
             if wanted is None:
                 self.phase, self.step = SupportPhase.STAND, None
                 return

@@ -7,6 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from wbmpc.planner.carry import Carry
 from wbmpc.planner.hand_path import HandPath, minimum_jerk
 from wbmpc.rotations import UP, level_frame
 from wbmpc.scenario import Load
@@ -66,6 +67,7 @@ class Lift:
         self._closed = np.zeros(2, dtype=bool)
         self._without = 0.0  # [s] without force
         self._told = load.mass
+        self.carry: Carry | None = None  # once the feet have set out with the box
 
     # ------------------------------------------------------------------ what others may ask
 
@@ -90,6 +92,16 @@ class Lift:
         return self.phase in (LiftPhase.GRIP, LiftPhase.RAISE, LiftPhase.CARRY)
 
     @property
+    def hold_feet(self) -> bool:
+        """Whether the feet must stay where they are: the hands are at the box, but do not have it yet."""
+        return self.active and self.phase != LiftPhase.CARRY
+
+    @property
+    def progress(self) -> float:
+        """Share of the way that the postures low and high stand for; a box that goes along leaves it to the stride."""
+        return 0.0 if self.carry is not None else self.sigma
+
+    @property
     def mode(self) -> HandMode:
         """What the tracker does with both hands; only when active."""
         return HandMode.CARRY if self.holds else HandMode.MOVE
@@ -107,6 +119,8 @@ class Lift:
     def reference(self, side: int) -> tuple[Vector, Vector]:
         """Palm position and velocity (3,) to follow now; only when active."""
         rate = self._rate
+        if self.carry is not None:
+            return self.carry.reference(side)
         if self.holds:
             s, ds, _ = minimum_jerk(self.sigma if self.raised else 0.0)
             return self.grasp[side] + s * self.task.height * UP, ds * rate * self.task.height * UP
@@ -118,11 +132,15 @@ class Lift:
         return p, dp * rate
 
     def sigmas(self, times: Vector) -> Vector:
-        """Shares (n,) of the present way `times` (n,) seconds from now."""
+        """Shares (n,) of the present way `times` (n,) seconds from now; see `progress`."""
+        if self.carry is not None:
+            return np.zeros(len(times))
         return np.clip(self.sigma + self._rate * times, 0.0, 1.0)
 
     def preview(self, times: Vector) -> Vector:
         """Palm references (2, n, 3) [m] at `times` (n,) seconds from now."""
+        if self.carry is not None:
+            return self.carry.preview()
         if self.holds:
             shares = self.sigmas(times) if self.raised else np.zeros(len(times))
             rise = np.array([minimum_jerk(float(s))[0] for s in shares]) * self.task.height
@@ -198,6 +216,16 @@ class Lift:
         if self.holds:
             self._feel(dt, pressed, palm_forces, palms, homes)
 
+    def go_along(self, com: Vector, course: Vector, *, heading: float, yaw_rate: float) -> None:
+        """The feet have set out: from now on the box goes with the CoM; see `Carry.follow`."""
+        if self.phase != LiftPhase.CARRY:
+            return
+        if self.carry is None:
+            palms = np.array([self.reference(side)[0] for side in range(2)])
+            self.carry = Carry(palms, com=com[:, 0], heading=heading)
+        self.carry.follow(com, course, heading=heading, yaw_rate=yaw_rate)
+        self.grasp = np.array([self.reference(side)[0] for side in range(2)])
+
     def _feel(self, dt: float, pressed: Vector, palm_forces: Vector, palms: Vector, homes: Vector) -> None:
         """The weight that hangs on the palms, the line between them, and whether the box is still there."""
         across = palms[0] - palms[1]
@@ -215,7 +243,7 @@ class Lift:
         self._paths = [
             HandPath(start=h.copy(), end=p, away=n) for h, p, n in zip(homes, apart, self.normals, strict=True)
         ]
-        self.sigma, self.mass = 1.0, 0.0
+        self.sigma, self.mass, self.carry = 1.0, 0.0, None
         self._enter(LiftPhase.GIVE_UP)
 
     def _enter(self, phase: LiftPhase) -> None:

@@ -228,6 +228,7 @@ class Planner:
             state.time,
             dt,
             rate=self._gate,
+            stay=self._tasks.hold_feet,
             soles=self._measured.soles,
             yaws=self._measured.sole_yaws,
             loads=state.sole_wrench_in_world[:, 2],
@@ -244,6 +245,8 @@ class Planner:
             com=self._measured.com,
             events=events,
         )
+        stepping = self._gait.stride is not None
+        self._tasks.go_along(self._com.value, self._course, self._gait.soles(self._gate), stepping=stepping)
         contacts.advance(
             dt,
             palms=self._measured.palms,
@@ -264,8 +267,7 @@ class Planner:
         if stride is not None or self._gait.phase == SupportPhase.STAND:  # walking keeps the standing posture
             self._references.update_postures(
                 self._contacts,
-                soles=feet.positions,
-                yaws=feet.yaws,
+                feet=feet,
                 stride=stride,
                 centre=centre,
                 iterations=iterations,
@@ -279,6 +281,13 @@ class Planner:
         """The alarm of a robot that stands; one that steps is not to stop, its coming steps catch it."""
         return self._com.alarm if self._gait.phase == SupportPhase.STAND else 0.0
 
+    @property
+    def _course(self) -> Vector:
+        """(N, 3) [m] where the CoM will be: the last plan's."""
+        if self._last is None or not np.isfinite(self._last.report.com).all():
+            return np.tile(self._com.value[:, 0], (self._preview.steps, 1))
+        return self._last.report.com
+
     def _supports(self, time: float) -> tuple[SupportPreview, SupportPreview]:
         """Support to judge the need for a contact by, at full pace, and to move in, at the gate's.
 
@@ -287,10 +296,7 @@ class Planner:
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
         margin = self._com.inset(walking=gait.walking)
 
-        times, growth = self._preview.times, settings.zmp_margin_growth
-        com = self._last.report.com if self._last is not None else np.full((len(times), 3), np.nan)
-        if not np.isfinite(com).all():
-            com = np.tile(self._com.value[:, 0], (len(times), 1))
+        times, growth, com = self._preview.times, settings.zmp_margin_growth, self._course
 
         def preview(rate: float, margin: float) -> SupportPreview:
             return gait.preview(time, times, rate=rate, margin=margin, growth=growth, com=com)

@@ -6,7 +6,9 @@ import numpy as np
 
 from wbmpc.planner.bands import horizontal_band
 from wbmpc.planner.contacts import Contacts
+from wbmpc.planner.footstep import Feet
 from wbmpc.planner.lean import Lean
+from wbmpc.planner.lift_postures import LiftPostures
 from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.reach import Reach
 from wbmpc.planner.stride import Stride
@@ -20,9 +22,6 @@ UNBOUNDED = 0.3  # [m] d of a hand without a reference
 SPENT = 0.02  # [m] palm error of a posture from which a contact does not reach
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
-LIFT_COM_COST = 10.0  # [cost / m²] how hard a lift's posture keeps its CoM over the feet
-LIFT_TILT_COST = 0.03  # [cost / rad²] how hard a lift's posture keeps the torso up: knees bend, not the back
-LIFT_SLACK = 0.01  # [m] of d of the hands that lift
 LEAN_BAND = 0.001  # [m] d of the CoM from a lean's way
 
 
@@ -39,9 +38,7 @@ class References:
         self._stand = Posture(robot, nominal=q, com_cost=COM_COST)
         self._reach_goal = Posture(robot, nominal=q, com_cost=COM_COST)
         self._lean_goal = Posture(robot, nominal=q, com_cost=LEAN_COST)
-        self._low, self._high = (  # the palms on the box to be lifted, and at the top
-            Posture(robot, nominal=q, com_cost=LIFT_COM_COST, tilt_cost=LIFT_TILT_COST) for _ in range(2)
-        )
+        self._lift = LiftPostures(robot, nominal=q)
         self._stride: Stride | None = None
         self._centre = np.zeros(2)  # [m] between the feet
 
@@ -51,8 +48,7 @@ class References:
         self,
         contacts: Contacts,
         *,
-        soles: Vector,
-        yaws: Vector,
+        feet: Feet,
         stride: Stride | None,
         centre: Vector,
         iterations: int,
@@ -63,17 +59,15 @@ class References:
         """
         self._centre = centre
         if self._stride is not None and stride is None:  # landed: stand on from there
-            self._stand.q = self._reach_goal.q.copy()
+            standing = self._stand if self._tasks.lifting is None else self._lift.low
+            standing.q = self._goal.q.copy()
         self._stride = stride
-        self._stand.iterate(iterations, soles=soles, yaws=yaws, palms=[None, None], centre=centre)
-        if stride is not None:
-            soles, yaws = stride.after.positions, stride.after.yaws
+        self._stand.iterate(iterations, soles=feet.positions, yaws=feet.yaws, palms=[None, None], centre=centre)
+        after = feet if stride is None else stride.after
         if self._tasks.lift is not None and self._tasks.lift.ahead:
-            for posture, ends in ((self._low, self._tasks.lift.grasp), (self._high, self._tasks.lift.top)):
-                held: list[PalmTarget | None] = [
-                    PalmTarget(end, normal) for end, normal in zip(ends, self._tasks.lift.normals, strict=True)
-                ]
-                posture.iterate(iterations, soles=soles, yaws=yaws, palms=held, centre=centre)
+            self._lift.iterate(iterations, self._tasks.lift, before=feet, after=after, centre=centre)
+        if self._tasks.lifting is not None:
+            return
         palms: list[PalmTarget | None] = [c.target for c in contacts.hands]
         for task in self._tasks.current:
             if isinstance(task, Lean):
@@ -81,12 +75,12 @@ class References:
             else:
                 palms[task.side] = PalmTarget(task.target)
         if stride is not None or self._tasks.leaning is not None or any(palm is not None for palm in palms):
-            self._goal.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
+            self._goal.iterate(iterations, soles=after.positions, yaws=after.yaws, palms=palms, centre=centre)
 
     @property
     def _goal(self) -> Posture:
         if self._tasks.lifting is not None:
-            return self._high if self._tasks.lifting.raised else self._low
+            return self._lift.high if self._tasks.lifting.raised else self._lift.low
         return self._lean_goal if self._tasks.leaning is not None else self._reach_goal
 
     # ------------------------------------------------------------------ over the horizon
@@ -152,7 +146,7 @@ class References:
     def _base(self, contacts: Contacts) -> Posture:
         """What the robot does without a task: stand, or brace; from where it goes on: hold what it lifts."""
         if self._tasks.lifting is not None and self._tasks.lifting.raised:
-            return self._low
+            return self._lift.low
         return contacts.posture if contacts.posture is not None else self._stand
 
     def _foot_distance(self, contacts: Contacts, share: Vector) -> Vector:
@@ -179,7 +173,7 @@ class References:
             if isinstance(task, Reach):
                 distance[task.side] = np.abs(task.target[:2] - self._goal.com[:2]) - self._tasks.shrink
         if self._tasks.lifting is not None:
-            distance[:] = self._lift_distance[:, :2] + LIFT_SLACK
+            distance[:] = self._lift.distance(self._tasks.lifting)[:, :2]
         return np.maximum(distance, REACH_FLOOR)
 
     def carried(self, times: Vector) -> Vector:
@@ -189,14 +183,8 @@ class References:
 
     def height_distance(self, usual: float) -> Vector:
         """d (2,) of each hand [m] for the CoM height: `usual`, or what lies between the two in a lift's postures."""
-        return np.full(2, usual) if self._tasks.lifting is None else self._lift_distance[:, 2] + LIFT_SLACK
-
-    @property
-    def _lift_distance(self) -> Vector:
-        """(2, 3) [m] the larger distance of each palm from the CoM, with the box down or up."""
-        assert self._tasks.lift is not None
-        low, high = self._tasks.lift.grasp - self._low.com, self._tasks.lift.top - self._high.com
-        return np.maximum(np.abs(low), np.abs(high))
+        lift = self._tasks.lifting
+        return np.full(len(SIDES), usual) if lift is None else self._lift.distance(lift)[:, 2]
 
     # ------------------------------------------------------------------ now
 

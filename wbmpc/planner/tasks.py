@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbmpc.planner.footstep import SoleReferences
 from wbmpc.planner.lean import Lean
 from wbmpc.planner.lift import Lift
 from wbmpc.planner.progress import TaskPhase
@@ -72,6 +73,17 @@ class Tasks:
             if task.progress.phase != before:
                 events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
 
+    def go_along(self, com: Vector, course: Vector, soles: SoleReferences, *, stepping: bool) -> None:
+        """What is carried goes with the CoM from the first stride on; see `Carry.follow`."""
+        if self.lift is not None and (stepping or self.lift.carry is not None):
+            heading, yaw_rate = float(soles.yaws.mean()), float(soles.yaw_rates.mean())
+            self.lift.go_along(com, course, heading=heading, yaw_rate=yaw_rate)
+
+    @property
+    def hold_feet(self) -> bool:
+        """Whether the feet must stay where they are."""
+        return self.lift is not None and self.lift.hold_feet
+
     @property
     def current(self) -> list[Reach] | list[Lean]:
         """The reaches still to be done, or the lean that comes before them."""
@@ -96,7 +108,7 @@ class Tasks:
     def sigma(self) -> float:
         """Progress of the furthest task, 0 … 1."""
         if self.lifting is not None:
-            return self.lifting.sigma
+            return self.lifting.progress
         return max((task.progress.sigma for task in self.current), default=0.0)
 
     @property

@@ -67,7 +67,7 @@ def _leans(tasks: Iterable[Task]) -> Iterator[Finding]:
 
 
 def _lifts(tasks: Iterable[Task]) -> Iterator[Finding]:
-    """A lift takes both hands and never lets go: it comes after all that moves hands or CoM, and the feet stay."""
+    """A lift takes both hands and never lets go: it comes after all that moves hands or CoM, and before any step."""
     lifts = [(index, task) for index, task in enumerate(tasks) if isinstance(task, LiftTask)]
     for index, _ in lifts[1:]:
         yield Finding(("tasks", index), f"a second lift task, first is tasks.{lifts[0][0]}")
@@ -77,8 +77,11 @@ def _lifts(tasks: Iterable[Task]) -> Iterator[Finding]:
             yield Finding(("tasks", index), message)
         elif isinstance(task, ComHeightTask):
             yield Finding(("tasks", index), f"tasks.{first} (lift) has a CoM height of its own")
-        elif isinstance(task, FootworkTask):
-            yield Finding(("tasks", index), f"the feet stay where they are beside tasks.{first} (lift)")
+        elif isinstance(task, WalkTask):
+            yield Finding(("tasks", index), f"the hands cannot carry in a walk, use go after tasks.{first} (lift)")
+        elif isinstance(task, FootworkTask) and task.start < lift.start:
+            message = f"begins at {task.start:g} s, but tasks.{first} (lift) is where the feet are, at {lift.start:g} s"
+            yield Finding(("tasks", index), message)
 
 
 def _footwork(tasks: Iterable[Task]) -> Iterator[Finding]:

@@ -1,0 +1,43 @@
+"""The two postures of a lift: the palms on the box, and where they bring it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wbmpc.planner.footstep import Feet
+from wbmpc.planner.lift import Lift
+from wbmpc.planner.posture import PalmTarget, Posture
+from wbmpc.robot import Robot
+from wbmpc.signals import Vector
+
+COM_COST = 10.0  # [cost / m²] how hard they keep the CoM over the feet
+TILT_COST = 0.03  # [cost / rad²] how hard they keep the torso up: knees bend, not the back
+SLACK = 0.01  # [m] of d of the hands that lift
+
+
+class LiftPostures:
+    """Low and high: the box where it is taken and where it is held; on the way, before a stride and after it."""
+
+    def __init__(self, robot: Robot, *, nominal: Vector) -> None:
+        """`nominal` (nq,): the posture to deviate from as little as possible."""
+        self.low, self.high = (
+            Posture(robot, nominal=nominal, com_cost=COM_COST, tilt_cost=TILT_COST) for _ in range(2)
+        )
+
+    def iterate(self, iterations: int, lift: Lift, *, before: Feet, after: Feet, centre: Vector) -> None:
+        """Improve both for the feet now and after the stride (the same without one); `centre` (2,) [m] of the CoM."""
+        for posture, feet, end in ((self.low, before, lift.grasp), (self.high, after, lift.top)):
+            if lift.carry is not None:
+                com = np.array([*centre, posture.com[2]])
+                end = lift.carry.beside(com, float(feet.yaws.mean()))
+            palms: list[PalmTarget | None] = [
+                PalmTarget(palm, normal) for palm, normal in zip(end, lift.normals, strict=True)
+            ]
+            posture.iterate(iterations, soles=feet.positions, yaws=feet.yaws, palms=palms, centre=centre)
+
+    def distance(self, lift: Lift) -> Vector:
+        """d (2, 3) [m] of the palms: the larger distance from the CoM of the two, along the world's axes."""
+        if lift.carry is not None:
+            return lift.carry.distance + SLACK
+        low, high = lift.grasp - self.low.com, lift.top - self.high.com
+        return np.maximum(np.abs(low), np.abs(high)) + SLACK
