@@ -20,6 +20,7 @@ world:
     table: {kind: box, size: [0.2, 0.6, 0.2], position: [0.3, 0.0]}
     stair: {kind: box, size: [0.2, 0.6, 0.02], position: [-0.5, 0.0], walkable: true}
     ghost: {kind: box, size: [0.2, 0.6, 0.2], position: [0.3, 1.0], present: false}
+  tiles: {position: [-2.0, 0.0], count: [2, 1], size: [0.2, 0.2], lowest: 0.01, highest: 0.02}
 patches:
   on_table: {on: table}
   on_ghost: {on: ghost, face: left, force_cap: 7.0}
@@ -45,7 +46,7 @@ def plant(tmp_path_factory: pytest.TempPathFactory):  # type: ignore[no-untyped-
 def test_every_geom_has_one_role(plant) -> None:  # type: ignore[no-untyped-def]
     _, model, facts = plant
     names = np.array(facts.geom_name)
-    assert set(names[~facts.geom_is_robot]) == {"floor", "table", "stair"}
+    assert set(names[~facts.geom_is_robot]) == {"floor", "table", "stair", "tile_0_0", "tile_1_0"}
     assert names[facts.geom_palm == 0].tolist() == ["left_palm_geom"]
     assert names[facts.geom_palm == 1].tolist() == ["right_palm_geom"]
     assert "left_foot" in names[facts.geom_foot == 0]
@@ -55,7 +56,7 @@ def test_every_geom_has_one_role(plant) -> None:  # type: ignore[no-untyped-def]
     assert facts.patch_geoms == {"on_table": frozenset({model.geom("table").id}), "on_ghost": frozenset()}
     np.testing.assert_allclose(facts.patch_normal["on_ghost"], [0, 1, 0])
     assert facts.patch_force_cap == {"on_table": 15.0, "on_ghost": 7.0}
-    assert set(names[facts.geom_walkable]) == {"floor", "stair"}
+    assert set(names[facts.geom_walkable]) == {"floor", "stair", "tile_0_0", "tile_1_0"}
 
 
 def test_mass_limits_and_targets(plant) -> None:  # type: ignore[no-untyped-def]

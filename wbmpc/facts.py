@@ -9,6 +9,7 @@ import numpy as np
 
 from wbmpc.checks.context import Facts, LiftedObject
 from wbmpc.robot import Robot
+from wbmpc.scenario.boxes import ground_boxes
 from wbmpc.scenario.consistency import FLOOR
 from wbmpc.scenario.patches import PatchPose
 from wbmpc.scenario.schema.scenario import Scenario
@@ -31,7 +32,7 @@ def facts_of(model: mujoco.MjModel, robot: Robot, scenario: Scenario, patches: S
     for side, name in enumerate(SIDES):
         foot[model.geom_bodyid == model.site(f"{name}_sole").bodyid[0]] = side
         palm[model.geom(f"{name}_palm_geom").id] = side
-    walkable = {FLOOR} | {name for name, box in scenario.world.objects.items() if box.walkable}
+    walkable = {FLOOR, *ground_boxes(scenario)}
     steps = sorted((task for task in scenario.tasks if isinstance(task, StepTask)), key=lambda task: task.start)
     tasks = scenario.tasks
     return Facts(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from wbmpc.robot import Robot
 from wbmpc.rotations import cross
 from wbmpc.scenario import Disturbance, SensorSettings
+from wbmpc.scenario.random_streams import Stream, generator
 from wbmpc.signals import MAX_CONTACTS, SIDES, Measurement, Truth, Vector
 
 PARTS = np.arange(4)[:, None]  # left and right sole, left and right palm
@@ -35,7 +36,7 @@ class Plant:
         self.model, self._robot, self._sensors = model, robot, sensors
         self.data = mujoco.MjData(model)
         self._step = model.opt.timestep
-        self._rng = np.random.default_rng(np.random.SeedSequence([seed, 1]))
+        self._rng = generator(seed, Stream.SENSOR_NOISE)
         self._noise = _noise_scales(sensors, robot.nj)
         self._pushes = [
             (d, model.body(d.body).id, np.array(d.impulse) / d.duration, np.array(d.point)) for d in disturbances

@@ -18,6 +18,11 @@ def second_task(task: str) -> str:
     return edited("disturbances:", f"  - {task}\ndisturbances:")
 
 
+def tiles(values: str, others: str = "count: [3, 2], size: [0.2, 0.2], lowest: 0.01, highest: 0.03") -> str:
+    """The base text with a field of tiles in which one key is another; `others` are the keys left as they are."""
+    return edited("patches:\n", f"  tiles: {{position: [1.0, 0.0], {others}, {values}}}\npatches:\n")
+
+
 # (what is wrong, text, the part of the text where the problem must point, message)
 MISTAKES = [
     (
@@ -434,6 +439,81 @@ MISTAKES = [
         ),
         "true}\npatches",
         "world.objects.crate.walkable: 'crate' has a mass, it gives way: no foot can stand on it",
+    ),
+    (
+        "tiles upside down",
+        tiles("highest: 0.03", "count: [3, 2], size: [0.2, 0.2], lowest: 0.04"),
+        "0.03}",
+        "world.tiles.highest: must not be less than lowest (0.04 m), got 0.03 m",
+    ),
+    (
+        "tiles as low as the floor",
+        tiles("lowest: 0.0", "count: [3, 2], size: [0.2, 0.2], highest: 0.04"),
+        "0.0}",
+        "world.tiles.lowest: must be > 0, got 0.0",
+    ),
+    (
+        "half a tile",
+        tiles("count: [3, 2.5]", "size: [0.2, 0.2], lowest: 0.01, highest: 0.03"),
+        "2.5",
+        "world.tiles.count.1: expected a whole number, got 2.5",
+    ),
+    (
+        "more tiles than anyone counts",
+        tiles("count: [51, 2]", "size: [0.2, 0.2], lowest: 0.01, highest: 0.03"),
+        "51",
+        "world.tiles.count.0: must be ≤ 50, got 51",
+    ),
+    (
+        "tiles without their size",
+        tiles("friction: 0.5", "count: [3, 2], lowest: 0.01, highest: 0.03"),
+        "tiles",
+        "world.tiles.size: required key is missing",
+    ),
+    (
+        "unknown key of the tiles",
+        tiles("frction: 0.5"),
+        "frction",
+        "world.tiles.frction: unknown key, did you mean 'friction'?",
+    ),
+    (
+        "object named as a tile",
+        tiles("friction: 0.5").replace("table", "tile_2_1"),
+        "tile_2_1:",
+        "world.objects.tile_2_1: the name 'tile_2_1' is taken by a tile (world.tiles)",
+    ),
+    (
+        "tiles wanted as patches",
+        tiles("friction: 0.5").replace("on: table", "on: tile_0_0"),
+        "tile_0_0, face",
+        "patches.right.on: no object 'tile_0_0', choices: table",
+    ),
+    (
+        "ground error of nothing less than everything",
+        edited("mass_scale: 1.0", "ground_error: 0.06"),
+        "0.06",
+        "plant.ground_error: must be ≤ 0.05, got 0.06",
+    ),
+    (
+        "negative ground error",
+        edited("mass_scale: 1.0", "ground_error: -0.004"),
+        "-0.004",
+        "plant.ground_error: must be ≥ 0, got -0.004",
+    ),
+    (
+        "tiles may vanish",
+        tiles("friction: 0.5").replace("mass_scale: 1.0", "ground_error: 0.01"),
+        "0.01}\nloop",
+        "plant.ground_error: must be less than the height of the lowest walkable object (the lowest tile, 0.01 m), "
+        "got 0.01 m",
+    ),
+    (
+        "a step may vanish",
+        edited("size: [0.2, 0.6, 0.2]", "walkable: true, size: [0.2, 0.6, 0.03]").replace(
+            "mass_scale: 1.0", "ground_error: 0.04"
+        ),
+        "0.04}\nloop",
+        "plant.ground_error: must be less than the height of the lowest walkable object (table, 0.03 m), got 0.04 m",
     ),
     (
         "weightless",

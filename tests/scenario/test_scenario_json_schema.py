@@ -63,6 +63,7 @@ OWN_BLOCKS = {
     "World",
     "Floor",
     "Box",
+    "Tiles",
     "Patch",
     "StandTask",
     "ComHeightTask",

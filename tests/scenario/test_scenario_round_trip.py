@@ -32,6 +32,16 @@ BOXES = st.fixed_dictionaries(
     optional={"bottom": numbers(0, 1), "yaw": numbers(-3, 3), "friction": numbers(0.1, 2), "present": st.booleans()}
     | {"walkable": st.booleans()},
 )
+TILES = st.fixed_dictionaries(
+    {
+        "position": st.lists(numbers(-3, 3), min_size=2, max_size=2),
+        "count": st.lists(st.integers(1, 5), min_size=2, max_size=2),
+        "size": st.lists(numbers(0.05, 0.5), min_size=2, max_size=2),
+        "lowest": numbers(0.01, 0.02),
+        "highest": numbers(0.02, 0.04),
+    },
+    optional={"friction": numbers(0.1, 2), "lowest_color": st.lists(numbers(0, 1), min_size=4, max_size=4)},
+)
 REACHES = st.builds(
     lambda target, start, travel, hand: {
         "kind": "reach",
@@ -91,11 +101,15 @@ def documents(draw: st.DrawFn) -> dict[str, object]:
         "robot": "tiny.xml",
         "seed": draw(st.integers(0, 2**63 - 1)),
         "duration": 10.0,
-        "world": {"floor": {"friction": draw(numbers(0.1, 2))}, "objects": objects},
+        "world": {"floor": {"friction": draw(numbers(0.1, 2))}, "objects": objects, "tiles": draw(st.none() | TILES)},
         "patches": patches,
         "tasks": draw(st.permutations(tasks))[: draw(st.integers(1, 5))],
         "disturbances": draw(st.lists(PUSHES, max_size=2)),
-        "plant": {"friction": draw(st.none() | numbers(0.1, 2)), "body_mass_scale": {"arm": draw(numbers(0.5, 2))}},
+        "plant": {
+            "friction": draw(st.none() | numbers(0.1, 2)),
+            "body_mass_scale": {"arm": draw(numbers(0.5, 2))},
+            "ground_error": draw(numbers(0, 0.009)),
+        },
         "checks": [draw(CHECKS)],
     }
 

@@ -1,5 +1,6 @@
 """Scenarios: YAML files -> typed, strict, located settings -> the MuJoCo world of a run."""
 
+from wbmpc.scenario.boxes import all_boxes, ground_boxes
 from wbmpc.scenario.consistency import check_names
 from wbmpc.scenario.ground import Tread, resolve_ground
 from wbmpc.scenario.json_schema import scenario_json_schema
@@ -26,7 +27,7 @@ from wbmpc.scenario.schema.tasks import (
     VelocityCommand,
     WalkTask,
 )
-from wbmpc.scenario.schema.world import Box, Floor, Patch, World
+from wbmpc.scenario.schema.world import Box, Floor, Patch, Tiles, World
 from wbmpc.scenario.world import build_world
 
 __all__ = [
@@ -56,15 +57,18 @@ __all__ = [
     "StepTask",
     "Sweep",
     "Task",
+    "Tiles",
     "Tread",
     "Variation",
     "VelocityCommand",
     "WalkTask",
     "World",
+    "all_boxes",
     "apply_overrides",
     "build_world",
     "check_names",
     "counterfactual",
+    "ground_boxes",
     "load_scenario",
     "parse_overrides",
     "resolve_ground",

@@ -14,7 +14,9 @@ from wbmpc.checks.settings import (
     UniversalSettings,
     WindowSettings,
 )
+from wbmpc.scenario.boxes import tile_names
 from wbmpc.scenario.diagnosis import Finding
+from wbmpc.scenario.ground_consistency import find_ground_inconsistencies
 from wbmpc.scenario.patches import FACES
 from wbmpc.scenario.robot_file import RobotNames
 from wbmpc.scenario.schema.scenario import Scenario
@@ -30,6 +32,7 @@ def find_inconsistencies(scenario: Scenario) -> list[Finding]:
     return [
         *_objects_and_patches(scenario),
         *_lifted_objects(scenario),
+        *find_ground_inconsistencies(scenario),
         *_times(scenario),
         *find_task_inconsistencies(scenario),
         *_rates(scenario),
@@ -52,6 +55,9 @@ def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Findin
             yield Finding(("world", "objects", name), "the robot has a geom of this name", at_key=True)
         elif name in movable and name in robot.bodies:
             yield Finding(("world", "objects", name), "the robot has a body of this name", at_key=True)
+    for name in tile_names(scenario.world.tiles) if scenario.world.tiles else ():
+        if name in robot.geoms:
+            yield Finding(("world", "tiles"), f"the robot has a geom called '{name}'", at_key=True)
 
 
 def check_names(scenario: Scenario) -> tuple[str, ...]:

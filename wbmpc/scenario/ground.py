@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from wbmpc.scenario.boxes import ground_boxes
 from wbmpc.scenario.obstacles import footprint
 from wbmpc.scenario.schema.scenario import Scenario
 from wbmpc.signals import Vector
@@ -18,9 +19,5 @@ class Tread:
 
 
 def resolve_ground(scenario: Scenario) -> tuple[Tread, ...]:
-    """All walkable boxes of a scenario, whether or not they are present, in the order of the file."""
-    return tuple(
-        Tread(corners=footprint(box), top=box.bottom + box.size[2])
-        for box in scenario.world.objects.values()
-        if box.walkable and box.mass is None
-    )
+    """All walkable boxes of a scenario, whether or not they are present, in the order of the file; then the tiles."""
+    return tuple(Tread(corners=footprint(box), top=box.bottom + box.size[2]) for box in ground_boxes(scenario).values())

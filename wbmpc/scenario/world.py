@@ -15,8 +15,11 @@ import mujoco
 import numpy as np
 
 from wbmpc.errors import RobotError
+from wbmpc.scenario.boxes import all_boxes, ground_boxes
 from wbmpc.scenario.consistency import FLOOR
+from wbmpc.scenario.random_streams import Stream, generator
 from wbmpc.scenario.schema.scenario import Scenario
+from wbmpc.scenario.schema.world import Box
 from wbmpc.signals import GRAVITY
 
 PICTURE_WIDTH, PICTURE_HEIGHT = 1280, 960  # [pixel] largest off-screen picture
@@ -31,8 +34,8 @@ ALL_LAYERS = 2**31 - 1  # every robot geom that collides with anything collides 
 def build_world(scenario: Scenario, robot_path: Path) -> mujoco.MjModel:
     """Build the plant of a scenario.
 
-    World geoms are called `floor` and by the names of the objects; objects that are not `present` are left out.
-    The physics step is `scenario.loop.timestep`.
+    World geoms are called `floor` and by the names of the objects and tiles; objects that are not `present` are left
+    out. The physics step is `scenario.loop.timestep`.
 
     Raises:
         RobotError: MuJoCo cannot read or compile the robot's file.
@@ -109,7 +112,7 @@ def _add_floor(spec: mujoco.MjSpec, scenario: Scenario) -> None:
 
 def _add_objects(spec: mujoco.MjSpec, scenario: Scenario) -> None:
     """Fixed boxes as geoms of the world, those with a mass as free bodies after the robot."""
-    for name, box in scenario.world.objects.items():
+    for name, box in _true_boxes(scenario).items():
         if not box.present:
             continue
         pose: dict[str, list[float]] = {
@@ -134,6 +137,16 @@ def _add_objects(spec: mujoco.MjSpec, scenario: Scenario) -> None:
             rgba=box.color,
             **placed,
         )
+
+
+def _true_boxes(scenario: Scenario) -> dict[str, Box]:
+    """The boxes with the ground's errors in them: those that carry feet are taller or shorter than declared."""
+    ground, largest = ground_boxes(scenario), scenario.plant.ground_error
+    errors = generator(scenario.seed, Stream.GROUND_ERROR).uniform(-largest, largest, len(ground))
+    return all_boxes(scenario) | {
+        name: box.model_copy(update={"size": (*box.size[:2], box.size[2] + float(error))})
+        for (name, box), error in zip(ground.items(), errors, strict=True)
+    }
 
 
 def _add_geom(spec: mujoco.MjSpec, scenario: Scenario, *, friction: float, body: Any = None, **attributes: Any) -> None:

@@ -9,6 +9,7 @@ from pydantic import Field
 from wbmpc.strict import Friction, NonNegative, Positive, StrictModel, Vector3
 
 MassScale = Annotated[float, Field(gt=0, le=10)]
+GroundError = Annotated[float, Field(ge=0, le=0.05)]
 
 
 class Impulse(StrictModel):
@@ -41,6 +42,10 @@ class PlantSettings(StrictModel):
     )
     friction: Friction | None = Field(
         default=None, description="True friction coefficient of floor and objects [-]; null: as declared in `world`."
+    )
+    ground_error: GroundError = Field(
+        default=0.0,
+        description="Walkable objects and tiles are higher or lower by up to so much, uniformly at random [m].",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -10,6 +10,7 @@ from wbmpc.strict import Fraction, Friction, Identifier, NonNegative, Positive, 
 
 Face = Literal["top", "bottom", "front", "back", "left", "right"]
 Colour = tuple[Fraction, Fraction, Fraction, Fraction]
+TileCount = Annotated[int, Field(ge=1, le=50)]  # the planner looks at every tile for every foothold
 
 
 class Floor(StrictModel):
@@ -49,11 +50,32 @@ class Box(StrictModel):
 WorldObject = Box
 
 
+class Tiles(StrictModel):
+    """A field of walkable tiles side by side on the floor, of random heights that the planner knows.
+
+    They are fixed boxes called `tile_COLUMN_ROW`, counted from 0 along x and y. Columns run along x, rows along y.
+    """
+
+    position: Vector2 = Field(description="Centre of the field in the horizontal plane: world x, y [m].")
+    count: tuple[TileCount, TileCount] = Field(description="Columns along x, rows along y [-].")
+    size: tuple[Positive, Positive] = Field(description="Edge lengths of one tile along x, y [m].")
+    lowest: Positive = Field(description="Tops are drawn uniformly, with the scenario's seed, from this height on [m].")
+    highest: Positive = Field(description="Up to this height above the floor [m].")
+    friction: Friction = Field(default=0.8, description="Coulomb friction coefficient [-].")
+    lowest_color: Colour = Field(
+        default=(0.36, 0.45, 0.58, 1.0), description="Of a tile of height `lowest`; shades in between, 0 to 1 [-]."
+    )
+    highest_color: Colour = Field(
+        default=(0.95, 0.88, 0.70, 1.0), description="Of a tile of height `highest`, 0 to 1 [-]."
+    )
+
+
 class World(StrictModel):
     """Everything around the robot."""
 
     floor: Floor = Field(default=Floor(), description="The floor, z = 0.")
     objects: dict[Identifier, WorldObject] = Field(default={}, description="Objects by name.")
+    tiles: Tiles | None = Field(default=None, description="Tiles of random heights; null: none.")
 
 
 class Patch(StrictModel):
