@@ -36,6 +36,7 @@ def test_every_kind_can_be_evaluated_and_answers_under_its_name() -> None:
         settings.Footsteps(kind="footsteps", min_count=1),
         settings.Travelled(kind="travelled", forward=(0.5, 0.6)),
         settings.Arrived(kind="arrived", tolerance=0.03),
+        settings.Climbed(kind="climbed", min=0.1),
         settings.FootMoved(kind="foot_moved", foot="left", tolerance=0.02),
         settings.ComOutsideStance(kind="com_outside_stance", min=0.05),
         settings.ContactSequence(kind="contact_sequence", min_contacts=2),
@@ -52,7 +53,7 @@ def test_every_kind_can_be_evaluated_and_answers_under_its_name() -> None:
     universal = results[: len(settings.UniversalSettings.model_fields)]
     assert all(result.passed for result in universal)
     failing = {result.name for result in results if not result.passed}
-    of_motion = {"footsteps", "travelled", "arrived", "foot_moved", "com_outside_stance", "com_drop"}
+    of_motion = {"footsteps", "travelled", "arrived", "climbed", "foot_moved", "com_outside_stance", "com_drop"}
     of_hands = {"reach", "brace_force", "contact_sequence", "both_hands", "lifted"}
     assert failing == {"com_beyond_toes", "com_height", "push_recovery"} | of_motion | of_hands
 

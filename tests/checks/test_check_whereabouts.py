@@ -12,7 +12,7 @@ from synthetic import LEFT_FOOT, RIGHT_FOOT, SOLES, SyntheticRun
 
 from wbmpc.checks import settings
 from wbmpc.checks.result import CheckResult
-from wbmpc.checks.whereabouts import ArrivedCheck, FootMovedCheck, TravelledCheck
+from wbmpc.checks.whereabouts import ArrivedCheck, ClimbedCheck, FootMovedCheck, TravelledCheck
 
 
 def moved_run(displacement: tuple[float, float], turn: float = 0.0, heading: float = 0.0) -> SyntheticRun:
@@ -159,3 +159,25 @@ def test_a_foot_in_the_air_over_its_target_or_without_one_fails() -> None:
     run = SyntheticRun()
     assert "no step task" in foot_moved(run).message
     assert foot_moved(run, target=(0.0, 0.05)).passed
+
+
+def climbed(run: SyntheticRun) -> CheckResult:
+    return ClimbedCheck(settings.Climbed(kind="climbed", min=0.1)).evaluate(run.context(), "climbed")
+
+
+def test_climbed_is_the_lower_sole_while_both_carry() -> None:
+    run = SyntheticRun()
+    assert not climbed(run).passed
+    run.sole_position[30:60, 0, 2] += 0.25  # one foot up, the other one follows less high, then down again
+    run.sole_position[40:50, 1, 2] += 0.12
+    result = climbed(run)
+    assert result.passed
+    assert result.value == pytest.approx(0.12 + SOLES[1, 2])
+    assert "t = 0.4" in result.message
+
+
+def test_a_foot_in_the_air_has_not_climbed() -> None:
+    run = SyntheticRun()
+    run.sole_position[30:60, :, 2] += 0.12
+    run.lift(range(30, 60), LEFT_FOOT)
+    assert not climbed(run).passed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from gait_case import HALF, SETTINGS, feet_at
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -74,6 +74,7 @@ def test_a_step_up_or_down_clears_the_edge_between(start: float, end: float, low
     assert level == 0.0
 
 
+@settings(max_examples=12, deadline=None)
 @given(rise=st.floats(0.01, 0.03), depth=st.floats(0.15, 0.2))
 def test_a_journey_over_stairs_puts_every_sole_on_one_tread(rise: float, depth: float) -> None:
     treads = stairs(rise, depth)

@@ -480,7 +480,7 @@ MISTAKES = [
         "object named as a tile",
         tiles("friction: 0.5").replace("table", "tile_2_1"),
         "tile_2_1:",
-        "world.objects.tile_2_1: the name 'tile_2_1' is taken by a tile (world.tiles)",
+        "world.objects.tile_2_1: the name 'tile_2_1' is taken by one of world.tiles",
     ),
     (
         "tiles wanted as patches",

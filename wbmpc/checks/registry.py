@@ -26,7 +26,7 @@ from wbmpc.checks.reach import ReachCheck
 from wbmpc.checks.result import CheckResult, failed
 from wbmpc.checks.settings import CheckSettings, UniversalSettings
 from wbmpc.checks.solvers import SolverFailuresCheck
-from wbmpc.checks.whereabouts import ArrivedCheck, FootMovedCheck, TravelledCheck
+from wbmpc.checks.whereabouts import ArrivedCheck, ClimbedCheck, FootMovedCheck, TravelledCheck
 from wbmpc.strict import StrictModel
 
 
@@ -59,6 +59,7 @@ CHECKS: dict[str, Any] = {  # kind -> class; a class takes its own settings mode
     "footsteps": FootstepsCheck,
     "travelled": TravelledCheck,
     "arrived": ArrivedCheck,
+    "climbed": ClimbedCheck,
     "foot_moved": FootMovedCheck,
     "com_outside_stance": ComOutsideStanceCheck,
     "contact_sequence": ContactSequenceCheck,

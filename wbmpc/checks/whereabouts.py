@@ -69,6 +69,20 @@ class ArrivedCheck:
         return result
 
 
+class ClimbedCheck:
+    """max over ticks of the height of the lower one of two loaded soles."""
+
+    def __init__(self, config: settings.Climbed) -> None:
+        self.config = config
+
+    def evaluate(self, context: CheckContext, name: str) -> CheckResult:
+        lower = context.recorder.sole_position[:, :, 2].min(axis=1)
+        lower = np.where(sole_loaded(context).all(axis=1), lower, -np.inf)
+        highest = int(np.argmax(lower))
+        message = f"both soles loaded, t = {context.time[highest]:.2f} s"
+        return at_least(name, float(lower[highest]), self.config.min, "m", message, when=None)
+
+
 class FootMovedCheck:
     """Distance of the sole's centre from the target at the end, the sole loaded and away from where it began."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from wbmpc.planner.support import convex_hull, foot_corners
@@ -21,15 +23,15 @@ class Footholds:
         self, obstacles: tuple[Obstacle, ...], half_extents: Vector, *, ground: tuple[Tread, ...] = ()
     ) -> None:
         """`half_extents` (2,) of a sole [m]."""
-        self._ground = ground
-        self._low = [o for o in obstacles if o.bottom < REACH_UP]
+        self._obstacles = _Things([o for o in obstacles if o.bottom < REACH_UP])
+        self._ground = _Things(ground)
         self._sole, self._half = half_extents, half_extents + MARGIN
 
     def free(self, position: Vector, yaw: float) -> bool:
         """Whether a sole with its centre at `position` (2,) [m] stands clear of every obstacle."""
         sole = foot_corners(position=position, yaw=yaw, half_extents=self._half)
         level = self._level(sole)
-        return level is not None and not any(_overlap(sole, obstacle.corners) for obstacle in self._low)
+        return level is not None and not self._obstacles.under(sole)
 
     def height(self, position: Vector, yaw: float, *, otherwise: float) -> float:
         """Height of the ground [m] under a sole with its centre at `position` (2,) [m]; `otherwise` over an edge."""
@@ -38,7 +40,7 @@ class Footholds:
 
     def _level(self, sole: Vector) -> float | None:
         """Height [m] of the tread, or floor, that carries a sole (4, 2) [m] as a whole; None over an edge."""
-        under = [tread for tread in self._ground if _overlap(sole, tread.corners)]
+        under = self._ground.under(sole)
         if not under:
             return 0.0
         highest = max(under, key=lambda tread: tread.top)
@@ -54,12 +56,26 @@ class Footholds:
         """
         sides = ((start, self._sole), (end, self._half))
         swept = convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in sides]))
-        things: list[Obstacle | Tread] = [*self._low, *self._ground]
-        tops = [thing.top - lowest for thing in things if _overlap(swept, thing.corners)]
+        tops = [thing.top - lowest for thing in [*self._obstacles.under(swept), *self._ground.under(swept)]]
         tops = [top for top in tops if top > LEVEL]
         if any(top > REACH_UP for top in tops):
             return None
         return max(tops) + CLEARANCE if tops else 0.0
+
+
+class _Things:
+    """Things on the floor, found by where they are."""
+
+    def __init__(self, things: Sequence[Obstacle | Tread]) -> None:
+        self._things = things
+        corners = np.array([thing.corners for thing in things]).reshape(-1, 4, 2)
+        self._lower, self._upper = corners.min(axis=1), corners.max(axis=1)  # (n, 2) [m]
+
+    def under(self, polygon: Vector) -> list[Obstacle | Tread]:
+        """Those whose footprints overlap a convex `polygon` (k, 2) [m], counter-clockwise."""
+        apart = (self._lower >= polygon.max(axis=0)) | (self._upper <= polygon.min(axis=0))
+        near = np.flatnonzero(~apart.any(axis=1)).tolist()  # most are far away; the exact test takes its time
+        return [self._things[i] for i in near if _overlap(polygon, self._things[i].corners)]
 
 
 def _inside(inner: Vector, outer: Vector) -> bool:

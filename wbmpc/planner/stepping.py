@@ -17,6 +17,7 @@ STILL = 1e-6  # [m/s, rad/s] a command below is to stand
 SIDE_SIGN = (1.0, -1.0)  # left is +y
 WORTH_A_STEP = 0.02  # [m] a foot that gets so much farther has moved
 SEARCH_STEP = 0.005  # [m] between the places that are tried for a foot
+MOST_FOUND = 64  # steps that are remembered
 CAREFUL_LEAD = 0.3  # of a slow step: the foot rises, goes over, comes down
 
 
@@ -33,6 +34,7 @@ class Stepping:
         self._walks = [(i, task) for i, task in enumerate(tasks) if isinstance(task, WalkTask)]
         self._steps = [(i, task) for i, task in enumerate(tasks) if isinstance(task, StepTask)]
         self._done: set[int] = set()
+        self._found: dict[tuple[int, bytes, int], Footstep | None] = {}  # of journeys, see `_searched`
 
     def landed(self, step: Footstep) -> None:
         """A step has been made."""
@@ -55,7 +57,7 @@ class Stepping:
                 return self._commanded(index, task, feet)
         for index, journey in self._journeys:
             if journey.start <= time + 1e-9:
-                return self._towards(index, journey, feet)
+                return self._searched(index, journey, feet)
         command = self.command(time)
         return None if command is None else self._walk(feet, command)
 
@@ -78,6 +80,15 @@ class Stepping:
             adaptable=False,
             task=index,
         )
+
+    def _searched(self, index: int, task: GoTask, feet: Feet) -> Footstep | None:
+        """`_towards`, looked for once from the same feet: every plan asks again for all steps of its horizon."""
+        key = (index, np.column_stack([feet.positions, feet.yaws]).tobytes(), feet.last)
+        if key not in self._found:
+            if len(self._found) >= MOST_FOUND:
+                self._found.clear()
+            self._found[key] = self._towards(index, task, feet)
+        return self._found[key]
 
     def _towards(self, index: int, task: GoTask, feet: Feet) -> Footstep | None:
         """The next step to a place: the nearest free foothold ahead, beyond an obstacle when there is none before it.
@@ -108,16 +119,20 @@ class Stepping:
             heights = feet.positions[side][2], self._on_ground(end, yaw, feet, side)[2]
             return self._footholds.crossed(start, end, yaw, lowest=float(min(heights)))
 
+        def free(end: Vector) -> bool:
+            return self._footholds.free(end, yaw)
+
         nominal = lift(place(wanted[0]))
-        if nominal == 0.0 and self._footholds.free(place(wanted[0]), yaw):
+        if nominal == 0.0 and free(place(wanted[0])):
             ahead = wanted[0]
         else:  # something is in the way: the first place beyond it, or the last one before
             tries = np.arange(0.0, abs(way) + 1e-9, SEARCH_STEP) * forward
-            beyond = [a for a in tries if lift(place(a)) and self._footholds.free(place(a), yaw)]
-            before = [a for a in tries if lift(place(a)) == 0.0]
+            lifts = [lift(place(a)) for a in tries]
+            beyond = [a for a, height in zip(tries, lifts, strict=True) if height and free(place(a))]
+            before = [a for a, height in zip(tries, lifts, strict=True) if height == 0.0]
             if not beyond and not before:
                 return None
-            near = [a for a in before if self._footholds.free(place(a), yaw)]
+            near = [a for a in before if free(place(a))]
             closer = bool(near) and abs((turn.T @ (place(near[-1]) - start))[0]) > WORTH_A_STEP
             ahead = beyond[0] if beyond else before[-1]
             if beyond and closer and abs(beyond[0]) > task.step_length:

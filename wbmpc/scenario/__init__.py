@@ -27,7 +27,7 @@ from wbmpc.scenario.schema.tasks import (
     VelocityCommand,
     WalkTask,
 )
-from wbmpc.scenario.schema.world import Box, Floor, Patch, Tiles, World
+from wbmpc.scenario.schema.world import Box, Floor, Patch, Staircase, Tiles, World
 from wbmpc.scenario.world import build_world
 
 __all__ = [
@@ -53,6 +53,7 @@ __all__ = [
     "RecordingSettings",
     "Scenario",
     "SensorSettings",
+    "Staircase",
     "StandTask",
     "StepTask",
     "Sweep",

@@ -14,7 +14,7 @@ from wbmpc.checks.settings import (
     UniversalSettings,
     WindowSettings,
 )
-from wbmpc.scenario.boxes import tile_names
+from wbmpc.scenario.boxes import made_names
 from wbmpc.scenario.diagnosis import Finding
 from wbmpc.scenario.ground_consistency import find_ground_inconsistencies
 from wbmpc.scenario.patches import FACES
@@ -55,9 +55,9 @@ def find_unknown_names(scenario: Scenario, robot: RobotNames) -> Iterator[Findin
             yield Finding(("world", "objects", name), "the robot has a geom of this name", at_key=True)
         elif name in movable and name in robot.bodies:
             yield Finding(("world", "objects", name), "the robot has a body of this name", at_key=True)
-    for name in tile_names(scenario.world.tiles) if scenario.world.tiles else ():
+    for name, key in made_names(scenario.world).items():
         if name in robot.geoms:
-            yield Finding(("world", "tiles"), f"the robot has a geom called '{name}'", at_key=True)
+            yield Finding(("world", key), f"the robot has a geom called '{name}'", at_key=True)
 
 
 def check_names(scenario: Scenario) -> tuple[str, ...]:

@@ -24,6 +24,7 @@ from wbmpc.checks.settings.hands import (
 from wbmpc.checks.settings.lift import ComDrop, ComInBand, Lifted
 from wbmpc.checks.settings.motion import (
     Arrived,
+    Climbed,
     ComBeyondToes,
     ComHeight,
     ComOutsideStance,
@@ -62,6 +63,7 @@ ScenarioCheck = Annotated[
     | Lifted
     | ComDrop
     | ComInBand
+    | Climbed
     | FootMoved
     | ComOutsideStance
     | ContactSequence
@@ -77,6 +79,7 @@ __all__ = [
     "BothHands",
     "BraceForce",
     "CheckSettings",
+    "Climbed",
     "ComBeyondToes",
     "ComDrop",
     "ComHeight",

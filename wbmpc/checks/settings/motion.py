@@ -100,6 +100,13 @@ class Arrived(CheckSettings):
     duration: Positive = Field(default=0.5, description="[s] how long at the end")
 
 
+class Climbed(CheckSettings):
+    """Both feet stand that high above the floor, at the same time and loaded."""
+
+    kind: Literal["climbed"]
+    min: Positive = Field(description="smallest height of the lower sole at its highest [m]")
+
+
 class FootMoved(CheckSettings):
     """At the end the foot stands, loaded, at the target, and has come from far enough away."""
 

@@ -70,11 +70,32 @@ class Tiles(StrictModel):
     )
 
 
+class Staircase(StrictModel):
+    """Steps up to a landing and down again on its other side: walkable fixed boxes called `tread_NUMBER`, from 0."""
+
+    position: Vector2 = Field(description="Middle of the first edge in the horizontal plane: world x, y [m].")
+    yaw: float = Field(default=0.0, description="Direction in which it goes up, about the world's z axis [rad].")
+    steps: Annotated[int, Field(ge=1, le=20)] = Field(description="Steps up, the landing is the last one [-].")
+    rise: Positive = Field(description="Height of one step [m].")
+    depth: Positive = Field(description="Length of one tread [m].")
+    landing: Positive = Field(description="Length of the landing [m].")
+    width: Positive = Field(description="Width of all treads [m].")
+    down: bool = Field(default=True, description="Whether as many steps lead down again.")
+    friction: Friction = Field(default=0.8, description="Coulomb friction coefficient [-].")
+    color: Colour = Field(default=(0.72, 0.53, 0.35, 1.0), description="Red, green, blue, opacity, each 0 to 1 [-].")
+
+    @property
+    def count(self) -> int:
+        """Treads in all, the landing included."""
+        return 2 * self.steps - 1 if self.down else self.steps
+
+
 class World(StrictModel):
     """Everything around the robot."""
 
     floor: Floor = Field(default=Floor(), description="The floor, z = 0.")
     objects: dict[Identifier, WorldObject] = Field(default={}, description="Objects by name.")
+    staircase: Staircase | None = Field(default=None, description="Steps up and down; null: none.")
     tiles: Tiles | None = Field(default=None, description="Tiles of random heights; null: none.")
 
 
