@@ -53,6 +53,7 @@ def facts_of(model: mujoco.MjModel, robot: Robot, scenario: Scenario, patches: S
         lifted_objects=tuple(_lifted_objects(model, scenario)),
         step_targets=tuple((SIDES.index(task.foot), np.array(task.target)) for task in steps),
         go_targets=tuple(np.array(task.target) for task in tasks if task.kind == "go"),
+        highest_ground=max((box.bottom + box.size[2] for box in ground_boxes(scenario).values()), default=None),
         reach_targets=tuple(np.array(task.target) for task in tasks if task.kind == "reach"),
         com_heights=tuple((p.time, p.height) for task in tasks if task.kind == "com_height" for p in task.waypoints),
         sole_vertices=_sole_corners(model, robot),

@@ -54,3 +54,9 @@ def level_frame(yaw: float) -> Vector:
     """Rotation (3, 3) to world of a frame with heading `yaw` [rad] and z up."""
     c, s = np.cos(yaw), np.sin(yaw)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def plane_rotation(yaw: float) -> Vector:
+    """Rotation (2, 2) by `yaw` [rad] in the horizontal plane."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    return np.array([[c, -s], [s, c]])

@@ -120,6 +120,7 @@ class SyntheticRun:
             "patch_force_cap": {"table_1": 8.0, "table_2": 6.0, "wall_1": 5.0},
             "step_targets": (),
             "go_targets": (),
+            "highest_ground": None,
             "patch_normal": {
                 "table_1": np.array([0.0, 0.0, 1.0]),
                 "table_2": np.array([0.0, 0.0, 1.0]),

@@ -161,8 +161,8 @@ def test_a_foot_in_the_air_over_its_target_or_without_one_fails() -> None:
     assert foot_moved(run, target=(0.0, 0.05)).passed
 
 
-def climbed(run: SyntheticRun) -> CheckResult:
-    return ClimbedCheck(settings.Climbed(kind="climbed", min=0.1)).evaluate(run.context(), "climbed")
+def climbed(run: SyntheticRun, wanted: float | None = 0.1) -> CheckResult:
+    return ClimbedCheck(settings.Climbed(kind="climbed", min=wanted)).evaluate(run.context(), "climbed")
 
 
 def test_climbed_is_the_lower_sole_while_both_carry() -> None:
@@ -181,3 +181,13 @@ def test_a_foot_in_the_air_has_not_climbed() -> None:
     run.sole_position[30:60, :, 2] += 0.12
     run.lift(range(30, 60), LEFT_FOOT)
     assert not climbed(run).passed
+
+
+def test_without_a_height_the_highest_ground_is_meant() -> None:
+    run = SyntheticRun()
+    assert "no higher ground" in climbed(run, None).message
+    run.facts["highest_ground"] = 0.08
+    assert not climbed(run, None).passed
+    run.sole_position[30:60, :, 2] += 0.08 - SOLES[:, 2].min()
+    assert climbed(run, None).passed
+    assert climbed(run, None).threshold == pytest.approx(0.075)

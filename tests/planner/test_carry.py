@@ -49,4 +49,4 @@ def test_seen_from_the_robot_the_palms_stay_where_they_are(time: float) -> None:
     for side in range(2):
         seen = level_frame(heading).T @ (carry.reference(side)[0] - com[:, 0])
         assert_allclose(seen, level_frame(0.3).T @ (PALMS[side] - COM), atol=1e-12)
-    assert_allclose(carry.distance, np.abs(carry.beside(com[:, 0], heading) - com[:, 0]), atol=1e-12)
+        assert_allclose(carry.beside(com[:, 0], heading)[side], carry.reference(side)[0], atol=1e-12)

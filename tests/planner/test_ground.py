@@ -47,22 +47,22 @@ def test_a_sole_is_carried_by_one_tread_or_by_the_floor_or_stands_on_an_edge(
     points = place + grid @ np.array([[c, s], [-s, c]])
     c, s = np.cos(turned), np.sin(turned)
     on = (np.abs(points @ np.array([[c, -s], [s, c]])) <= [0.15, 0.125]).all(axis=1)  # in the board's own axes
-    height = footholds.height(place, yaw, otherwise=-1.0)
+    height = footholds.height(place, yaw)
     if on.all():
-        assert height in (0.03, -1.0)  # a point of the outline may be outside where the grid has none
+        assert height in (0.03, None)  # a point of the outline may be outside where the grid has none
     elif not on.any():
-        assert height in (0.0, -1.0)
+        assert height in (0.0, None)
     else:
-        assert height == -1.0
+        assert height is None
         assert not footholds.free(place, yaw)
 
 
 def test_of_two_treads_the_higher_one_carries() -> None:
     footholds = Footholds((), HALF, ground=(tread(0.0, 0.0, 0.02, length=1.0), tread(0.3, 0.0, 0.04, length=0.4)))
-    assert footholds.height(np.array([0.3, 0.0]), 0.0, otherwise=-1.0) == 0.04
-    assert footholds.height(np.array([-0.2, 0.0]), 0.0, otherwise=-1.0) == 0.02
-    assert footholds.height(np.array([0.1, 0.0]), 0.0, otherwise=-1.0) == -1.0
-    assert footholds.height(np.array([2.0, 0.0]), 0.0, otherwise=-1.0) == 0.0
+    assert footholds.height(np.array([0.3, 0.0]), 0.0) == 0.04
+    assert footholds.height(np.array([-0.2, 0.0]), 0.0) == 0.02
+    assert footholds.height(np.array([0.1, 0.0]), 0.0) is None
+    assert footholds.height(np.array([2.0, 0.0]), 0.0) == 0.0
 
 
 @pytest.mark.parametrize(("start", "end", "lowest"), [(0.025, 0.175, 0.0), (0.175, 0.025, 0.0), (0.325, 0.175, 0.02)])

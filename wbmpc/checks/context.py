@@ -49,6 +49,7 @@ class Facts:
     reach_targets: tuple[Vector, ...]  # (3,) [m] in world, of the scenario's reach tasks
     step_targets: tuple[tuple[int, Vector], ...]  # side index, (2,) [m] in world, of the step tasks in order of time
     go_targets: tuple[Vector, ...]  # (2,) [m] in world, of the go tasks
+    highest_ground: float | None  # [m] of what feet may stand on besides the floor, as told; None: there is nothing
     com_heights: tuple[tuple[float, float], ...]  # ([s], [m]) waypoints of the com_height task, above the floor
     sole_vertices: Callable[
         [Vector], Vector

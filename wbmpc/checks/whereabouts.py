@@ -12,6 +12,8 @@ from wbmpc.checks.footsteps import sole_loaded
 from wbmpc.checks.result import CheckResult, at_least, at_most, failed, first_time
 from wbmpc.signals import SIDES, Vector
 
+LEVEL = 0.005  # [m] within which a sole is as high as the ground: the controller is not told of all its errors
+
 
 class TravelledCheck:
     """Displacement of the midpoint between the soles, and the feet's mean turn, over the window.
@@ -76,11 +78,16 @@ class ClimbedCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
+        wanted, top = self.config.min, context.facts.highest_ground
+        if wanted is None:
+            if top is None:
+                return failed(name, 0.0, "m", "the world holds no higher ground and the check no height")
+            wanted = top - LEVEL
         lower = context.recorder.sole_position[:, :, 2].min(axis=1)
         lower = np.where(sole_loaded(context).all(axis=1), lower, -np.inf)
         highest = int(np.argmax(lower))
         message = f"both soles loaded, t = {context.time[highest]:.2f} s"
-        return at_least(name, float(lower[highest]), self.config.min, "m", message, when=None)
+        return at_least(name, float(lower[highest]), wanted, "m", message, when=None)
 
 
 class FootMovedCheck:

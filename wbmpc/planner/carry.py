@@ -25,11 +25,6 @@ class Carry:
         self._com, self._course = com, course
         self._turn, self._yaw_rate = level_frame(heading), yaw_rate
 
-    @property
-    def distance(self) -> Vector:
-        """(2, 3) [m] between palms and CoM along the world's axes."""
-        return np.abs(self._places @ self._turn.T)
-
     def beside(self, com: Vector, heading: float) -> Vector:
         """Palms (2, 3) [m] when the CoM is at `com` (3,) [m]."""
         return com + self._places @ level_frame(heading).T

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wbmpc.planner.support import convex_hull, foot_corners
+from wbmpc.planner.support import UNEVEN, convex_hull, foot_corners
 from wbmpc.scenario import Obstacle, Tread
 from wbmpc.signals import Vector
 
-MARGIN = 0.012  # [m] kept between a sole and an obstacle
+MARGIN, EDGE_MARGIN = 0.012, 0.006  # [m] kept between a sole and an obstacle, and the edge of what carries it
 REACH_UP = 0.10  # [m] obstacles that begin higher are not in a foot's way; those that end higher cannot be stepped over
 LEVEL = 0.002  # [m] steps up or down that are none
 CLEARANCE = 0.025  # [m] of a swing foot over what it steps over
@@ -25,18 +25,29 @@ class Footholds:
         """`half_extents` (2,) of a sole [m]."""
         self._obstacles = _Things([o for o in obstacles if o.bottom < REACH_UP])
         self._ground = _Things(ground)
-        self._sole, self._half = half_extents, half_extents + MARGIN
+        self._sole = half_extents
 
     def free(self, position: Vector, yaw: float) -> bool:
         """Whether a sole with its centre at `position` (2,) [m] stands clear of every obstacle."""
-        sole = foot_corners(position=position, yaw=yaw, half_extents=self._half)
-        level = self._level(sole)
-        return level is not None and not self._obstacles.under(sole)
+        carried, clear = (
+            foot_corners(position=position, yaw=yaw, half_extents=self._sole + margin)
+            for margin in (EDGE_MARGIN, MARGIN)
+        )
+        return self._level(carried) is not None and not self._obstacles.under(clear)
 
-    def height(self, position: Vector, yaw: float, *, otherwise: float) -> float:
-        """Height of the ground [m] under a sole with its centre at `position` (2,) [m]; `otherwise` over an edge."""
-        level = self._level(foot_corners(position=position, yaw=yaw, half_extents=self._sole))
-        return otherwise if level is None else level
+    def height(self, position: Vector, yaw: float) -> float | None:
+        """Height of the ground [m] under a sole with its centre at `position` (2,) [m]; None over an edge."""
+        return self._level(foot_corners(position=position, yaw=yaw, half_extents=self._sole))
+
+    def on_ground(self, place: Vector, yaw: float, *, stance: Vector, stance_yaw: float) -> Vector:
+        """(3,) [m] a sole's centre at `place` (2,): as high as the ground is said to be there.
+
+        On the level that carries the foot at `stance` (3,), and over an edge, it is as high as that one.
+        """
+        own, level = self.height(stance[:2], stance_yaw), self.height(place, yaw)
+        if level is None or level == own or (own is None and abs(level - stance[2]) < UNEVEN):
+            level = float(stance[2])
+        return np.array([*place, level])
 
     def _level(self, sole: Vector) -> float | None:
         """Height [m] of the tread, or floor, that carries a sole (4, 2) [m] as a whole; None over an edge."""
@@ -46,6 +57,10 @@ class Footholds:
         highest = max(under, key=lambda tread: tread.top)
         return highest.top if _inside(sole, highest.corners) else None
 
+    def obstructed(self, start: Vector, end: Vector, yaw: float) -> bool:
+        """Whether an obstacle is in a sole's straight way from `start` to `end` (2,) [m], or too near to its end."""
+        return bool(self._obstacles.under(self._swept(start, end, yaw, MARGIN)))
+
     def crossed(self, start: Vector, end: Vector, yaw: float, *, lowest: float = 0.0) -> float | None:
         """Height to lift a sole by on its straight way from `start` to `end` (2,) [m]: 0 when nothing is in the way.
 
@@ -54,13 +69,20 @@ class Footholds:
         None: something is too high to step over. Where a foot has landed it may stand closer than the margin to what it
         leaves: that is no longer in its way.
         """
-        sides = ((start, self._sole), (end, self._half))
-        swept = convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in sides]))
-        tops = [thing.top - lowest for thing in [*self._obstacles.under(swept), *self._ground.under(swept)]]
+        things = [
+            *self._obstacles.under(self._swept(start, end, yaw, MARGIN)),
+            *self._ground.under(self._swept(start, end, yaw, EDGE_MARGIN)),
+        ]
+        tops = [thing.top - lowest for thing in things]
         tops = [top for top in tops if top > LEVEL]
         if any(top > REACH_UP for top in tops):
             return None
         return max(tops) + CLEARANCE if tops else 0.0
+
+    def _swept(self, start: Vector, end: Vector, yaw: float, margin: float) -> Vector:
+        """Outline (k, 2) [m] of a sole's way, with a `margin` [m] at its end: where it is, it stands already."""
+        ends = ((start, self._sole), (end, self._sole + margin))
+        return convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in ends]))
 
 
 class _Things:
@@ -73,6 +95,8 @@ class _Things:
 
     def under(self, polygon: Vector) -> list[Obstacle | Tread]:
         """Those whose footprints overlap a convex `polygon` (k, 2) [m], counter-clockwise."""
+        if not self._things:
+            return []
         apart = (self._lower >= polygon.max(axis=0)) | (self._upper <= polygon.min(axis=0))
         near = np.flatnonzero(~apart.any(axis=1)).tolist()  # most are far away; the exact test takes its time
         return [self._things[i] for i in near if _overlap(polygon, self._things[i].corners)]

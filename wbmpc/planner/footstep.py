@@ -6,7 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbmpc.rotations import plane_rotation
 from wbmpc.signals import Vector
+
+SIDE_SIGN = (1.0, -1.0)  # left is +y
+CAREFUL_LEAD = 0.3  # of a slow step: the foot rises, goes over, comes down
+ALIGNED, ALIGNED_YAW = 0.02, 0.06  # [m], [rad] feet so close to side by side need no further step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +52,17 @@ class Feet:
     positions: Vector  # (2, 3) [m] sole centres in world
     yaws: Vector  # (2,) [rad]
     last: int  # side of the foot that moved last; -1 when none has
+
+    @property
+    def heading(self) -> float:
+        """[rad] the robot's, between the two."""
+        return float(self.yaws.mean())
+
+    @property
+    def aligned(self) -> bool:
+        """Whether they stand side by side."""
+        across = plane_rotation(self.heading).T @ (self.positions[0] - self.positions[1])[:2]
+        return bool(abs(across[0]) < ALIGNED and abs(self.yaws[0] - self.yaws[1]) < ALIGNED_YAW)
 
     def after(self, step: Footstep) -> Feet:
         """The feet when `step` has been made."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbmpc.planner.footstep import Feet, Footstep
+from wbmpc.planner.footstep import SIDE_SIGN, Feet, Footstep
 from wbmpc.planner.settings import GaitSettings
-from wbmpc.planner.stepping import SIDE_SIGN, turning_room
+from wbmpc.planner.stepping import turning_room
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS
 from wbmpc.planner.swing import Swing
 from wbmpc.signals import Vector

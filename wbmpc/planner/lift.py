@@ -93,8 +93,8 @@ class Lift:
 
     @property
     def hold_feet(self) -> bool:
-        """Whether the feet must stay where they are: the hands are at the box, but do not have it yet."""
-        return self.active and self.phase != LiftPhase.CARRY
+        """Whether the feet must stay where they are: what they are to do comes after the box is up."""
+        return self.phase not in (LiftPhase.CARRY, LiftPhase.DONE)
 
     @property
     def progress(self) -> float:

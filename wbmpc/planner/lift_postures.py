@@ -12,6 +12,7 @@ from wbmpc.signals import Vector
 
 COM_COST = 10.0  # [cost / m²] how hard they keep the CoM over the feet
 TILT_COST = 0.03  # [cost / rad²] how hard they keep the torso up: knees bend, not the back
+UNBOUNDED = 0.3  # [m] d of palms that go along with the CoM
 SLACK = 0.01  # [m] of d of the hands that lift
 
 
@@ -38,6 +39,6 @@ class LiftPostures:
     def distance(self, lift: Lift) -> Vector:
         """d (2, 3) [m] of the palms: the larger distance from the CoM of the two, along the world's axes."""
         if lift.carry is not None:
-            return lift.carry.distance + SLACK
+            return np.full((2, 3), UNBOUNDED)
         low, high = lift.grasp - self.low.com, lift.top - self.high.com
         return np.maximum(np.abs(low), np.abs(high)) + SLACK

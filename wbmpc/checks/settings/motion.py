@@ -104,7 +104,10 @@ class Climbed(CheckSettings):
     """Both feet stand that high above the floor, at the same time and loaded."""
 
     kind: Literal["climbed"]
-    min: Positive = Field(description="smallest height of the lower sole at its highest [m]")
+    min: Positive | None = Field(
+        default=None,
+        description="height of the lower sole at its highest [m]; null: that of the highest ground, less 5 mm",
+    )
 
 
 class FootMoved(CheckSettings):
