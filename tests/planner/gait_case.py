@@ -59,6 +59,7 @@ class IdealGait:
     gait: Gait
     time: float = 0.0
     error: Vector = field(default_factory=lambda: np.zeros(2))  # [m] by which the next landing misses its place
+    stay: bool = False
     zmp: Vector | None = None  # [m] of the feet; None: where the foot that stays can carry it
     events: list[str] = field(default_factory=list)
 
@@ -86,6 +87,7 @@ class IdealGait:
         gait.advance(
             *(self.time, DT),
             rate=rate,
+            stay=self.stay,
             soles=soles,
             yaws=yaws,
             loads=loads,

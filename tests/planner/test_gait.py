@@ -57,6 +57,19 @@ def test_phases_have_their_durations() -> None:
     assert [event.split()[2] for event in run.events[:4]] == ["lifted", "landed", "lifted", "landed"]
 
 
+def test_told_to_stay_it_begins_no_step_and_ends_the_one_under_way() -> None:
+    run = IdealGait.of(walk(FORWARD))
+    run.stay = True
+    run.run(2.0)
+    assert run.gait.phase == SupportPhase.STAND
+    assert not run.events
+    run.stay = False
+    until(run, SupportPhase.SINGLE)
+    run.stay = True
+    run.run(5.0)
+    assert len(run.events) > 4  # a walk does not stop in the middle
+
+
 def test_standing_without_a_task_goes_on() -> None:
     run = IdealGait.of()
     run.run(2.0)

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from wbmpc.planner.footholds import CLEARANCE, Footholds
+from wbmpc.planner.footholds import CLEARANCE, EDGE_MARGIN, Footholds
 from wbmpc.planner.footstep import Feet
+from wbmpc.planner.journey import SEARCH_STEP, WORTH_A_STEP
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support import convex_hull, foot_corners
 from wbmpc.planner.support_interval import Interval
@@ -92,6 +93,9 @@ def test_a_journey_over_stairs_puts_every_sole_on_one_tread(rise: float, depth: 
         assert expected == {float(step.position[2])}
         rises = abs(step.position[2] - feet.positions[step.side][2])
         assert step.clearance >= rises + 0.02
+        if rises > 0.0:  # up or down: from as near to the edge as a foot gets, to as near behind it
+            apart = abs(step.position[0] - feet.positions[1 - step.side][0])
+            assert apart < 2.0 * (HALF[0] + EDGE_MARGIN) + WORTH_A_STEP + 2 * SEARCH_STEP
         feet = feet.after(step)
         highest = max(highest, float(step.position[2]))
     assert highest == pytest.approx(4 * rise)
@@ -127,3 +131,35 @@ def test_on_one_level_the_projection_changes_nothing() -> None:
     onto = interval.polygon(0.0, half_extents=HALF, margin=0.01, onto=(0.0, np.array([0.1, 0.0, 0.25])))
     assert_allclose(onto.offsets, plain.offsets, atol=1e-12)
     assert_allclose(onto.vertices, plain.vertices, atol=1e-12)
+
+
+def test_a_foot_finds_a_place_a_little_wider_beside_an_edge_that_runs_along_the_way() -> None:
+    board = tread(
+        0.6, 0.52, 0.01, length=1.0, width=1.0
+    )  # its right edge is at y = 0.02, under the left foot's inner side
+    stepping, feet = (
+        Stepping((GoTask(kind="go", target=(0.5, 0.0)),), SETTINGS, Footholds((), HALF, ground=(board,))),
+        feet_at(),
+    )
+    carried = set()
+    while (step := stepping.next(feet, 1.0)) is not None and len(carried) < 40:
+        carried.add((step.side, round(float(step.position[0]), 3), float(step.position[2])))
+        low, high = step.position[1] - HALF[1], step.position[1] + HALF[1]
+        if step.position[0] > 0.1 + HALF[0]:
+            assert high <= 0.02 or low >= 0.02
+        feet = feet.after(step)
+    assert feet.positions[:, 0].mean() == pytest.approx(0.5, abs=0.02)
+    assert {height for side, _, height in carried if side == 0} == {0.0, 0.01}
+    assert {height for side, _, height in carried if side == 1} == {0.0}
+
+
+def test_on_the_level_that_carries_the_other_foot_a_sole_is_as_high_as_that_one() -> None:
+    """What is known of the ground is in steps from one level to the other: an estimate that drifts must not matter."""
+    footholds = Footholds((), HALF, ground=stairs())
+    on_first = np.array([0.175, -0.05, 0.0213])  # 1.3 mm higher than the tread is said to be
+    same = footholds.on_ground(np.array([0.175, 0.05]), 0.0, stance=on_first, stance_yaw=0.0)
+    assert same[2] == 0.0213
+    higher = footholds.on_ground(np.array([0.325, 0.05]), 0.0, stance=on_first, stance_yaw=0.0)
+    assert higher[2] == 0.04
+    edge = footholds.on_ground(np.array([0.25, 0.05]), 0.0, stance=on_first, stance_yaw=0.0)
+    assert edge[2] == 0.0213

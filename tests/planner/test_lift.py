@@ -157,3 +157,54 @@ def test_palms_that_cannot_come_near_give_up() -> None:
         bench.palms = bench.palms + np.array([0.0, 0.0, 0.03])
     assert LiftPhase.CLOSE not in bench.phases
     assert LiftPhase.GIVE_UP in bench.phases
+
+
+def test_the_feet_stay_until_the_box_is_up() -> None:
+    bench = Bench()
+    assert bench.lift.hold_feet  # before it has begun as well
+    stayed = []
+    for _ in range(600):
+        bench.step()
+        stayed.append((bench.lift.phase, bench.lift.hold_feet))
+    assert stayed[-1][0] == LiftPhase.CARRY
+    assert all(held == (phase != LiftPhase.CARRY) for phase, held in stayed)
+
+
+def test_when_the_feet_set_out_the_box_goes_with_the_com_without_a_jump() -> None:
+    bench = Bench().run(6.0)
+    lift, com = bench.lift, np.zeros((3, 3))
+    com[:, 0] = [0.02, 0.0, 0.25]
+    before = np.array([lift.reference(side)[0] for side in range(2)])
+    course = np.tile(com[:, 0], (5, 1)) + 0.01 * np.arange(5)[:, None] * [1.0, 0.0, 0.0]
+    lift.go_along(com, course, heading=0.0, yaw_rate=0.0)
+    assert_allclose([lift.reference(side)[0] for side in range(2)], before, atol=1e-12)
+    assert_allclose(
+        lift.preview(np.zeros(5)) - lift.preview(np.zeros(5))[:, :1], (course - course[0])[None].repeat(2, 0)
+    )
+    com[:, 0] += [0.05, 0.04, 0.02]
+    com[:, 1] = [0.1, 0.0, 0.0]
+    lift.go_along(com, course, heading=0.0, yaw_rate=0.0)
+    for side in range(2):
+        position, velocity = lift.reference(side)
+        assert_allclose(position - before[side], [0.05, 0.04, 0.02], atol=1e-12)
+        assert_allclose(velocity, [0.1, 0.0, 0.0])
+    assert_allclose(lift.grasp - before, np.tile([0.05, 0.04, 0.02], (2, 1)), atol=1e-12)
+    assert lift.progress == 0.0
+
+
+def test_before_the_box_is_up_nothing_goes_along() -> None:
+    bench = Bench().run(1.0)
+    bench.lift.go_along(np.zeros((3, 3)), np.zeros((5, 3)), heading=0.0, yaw_rate=0.0)
+    assert bench.lift.carry is None
+
+
+def test_a_box_that_is_lost_on_the_way_is_given_up_where_the_palms_are() -> None:
+    bench = Bench().run(6.0)
+    com = np.zeros((3, 3))
+    bench.lift.go_along(com, np.zeros((5, 3)), heading=0.0, yaw_rate=0.0)
+    bench.present = False
+    for _ in range(100):
+        bench.lift.advance(bench.time, DT, palms=bench.palms, palm_forces=np.zeros((2, 3)), homes=bench.homes)
+        bench.time += DT
+    assert bench.lift.phase == LiftPhase.GIVE_UP
+    assert bench.lift.carry is None

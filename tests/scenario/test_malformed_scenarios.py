@@ -18,6 +18,13 @@ def second_task(task: str) -> str:
     return edited("disturbances:", f"  - {task}\ndisturbances:")
 
 
+def after_a_lift(task: str) -> str:
+    """The base text with a lift of a crate and then another task."""
+    crate = "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\n"
+    text = second_task("{kind: lift, object: crate, height: 0.1, start: 8.6, reach_time: 1.0, raise_time: 1.0}")
+    return text.replace("patches:", f"{crate}patches:", 1).replace("disturbances:", f"  - {task}\ndisturbances:", 1)
+
+
 def tiles(values: str, others: str = "count: [3, 2], size: [0.2, 0.2], lowest: 0.01, highest: 0.03") -> str:
     """The base text with a field of tiles in which one key is another; `others` are the keys left as they are."""
     return edited("patches:\n", f"  tiles: {{position: [1.0, 0.0], {others}, {values}}}\npatches:\n")
@@ -411,22 +418,20 @@ MISTAKES = [
         "tasks.0: ends at 8.5 s, but tasks.1 (lift) takes both hands from 7 s on",
     ),
     (
-        "lift with steps",
-        second_task("{kind: lift, object: crate, height: 0.1, start: 8.6, reach_time: 1.0, raise_time: 1.0}")
-        .replace(
-            "patches:", "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\npatches:", 1
-        )
-        .replace("disturbances:", "  - {kind: go, target: [1.0, 0.0], start: 9.0}\ndisturbances:", 1),
+        "lift with a walk",
+        after_a_lift("{kind: walk, commands: [{time: 9.0, velocity: [0.1, 0.0]}]}"),
+        "{kind: walk",
+        "tasks.2: the hands cannot carry in a walk, use go after tasks.1 (lift)",
+    ),
+    (
+        "steps before the lift",
+        after_a_lift("{kind: go, target: [1.0, 0.0], start: 8.0}"),
         "{kind: go",
-        "tasks.2: the feet stay where they are beside tasks.1 (lift)",
+        "tasks.2: begins at 8 s, but tasks.1 (lift) is where the feet are, at 8.6 s",
     ),
     (
         "lift with a height of its own",
-        second_task("{kind: lift, object: crate, height: 0.1, start: 8.6, reach_time: 1.0, raise_time: 1.0}")
-        .replace(
-            "patches:", "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\npatches:", 1
-        )
-        .replace("disturbances:", "  - {kind: com_height, waypoints: [{time: 1.0, height: 0.25}]}\ndisturbances:", 1),
+        after_a_lift("{kind: com_height, waypoints: [{time: 1.0, height: 0.25}]}"),
         "{kind: com_height",
         "tasks.2: tasks.1 (lift) has a CoM height of its own",
     ),
