@@ -181,6 +181,8 @@ def test_a_foot_in_the_air_has_not_climbed() -> None:
     run.sole_position[30:60, :, 2] += 0.12
     run.lift(range(30, 60), LEFT_FOOT)
     assert not climbed(run).passed
+    run.lift(range(len(run.sole_position)), LEFT_FOOT)
+    assert "never loaded" in climbed(run).message
 
 
 def test_without_a_height_the_highest_ground_is_meant() -> None:

@@ -15,7 +15,7 @@ from wbmpc.planner.footstep import Feet
 from wbmpc.planner.gait import EARLY, SEARCH_TIME, SupportPhase
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_interval import Interval, Transfer
-from wbmpc.scenario import Task
+from wbmpc.scenario import GoTask, Task
 from wbmpc.signals import Vector
 
 TIMES = 0.1 * np.arange(1, 17)  # [s] knots
@@ -68,6 +68,17 @@ def test_told_to_stay_it_begins_no_step_and_ends_the_one_under_way() -> None:
     run.stay = True
     run.run(5.0)
     assert len(run.events) > 4  # a walk does not stop in the middle
+
+
+def test_told_to_stay_it_makes_the_stride_under_way_and_no_other() -> None:
+    run = IdealGait.of(GoTask(kind="go", target=(0.5, 0.0), start=0.0))
+    until(run, SupportPhase.SINGLE)
+    run.stay = True
+    run.run(8.0)
+    assert run.gait.phase == SupportPhase.STAND
+    assert [event.split()[2] for event in run.events] == ["lifted", "landed"]
+    run.stay = False
+    until(run, SupportPhase.SINGLE)
 
 
 def test_standing_without_a_task_goes_on() -> None:

@@ -86,6 +86,8 @@ class ClimbedCheck:
         lower = context.recorder.sole_position[:, :, 2].min(axis=1)
         lower = np.where(sole_loaded(context).all(axis=1), lower, -np.inf)
         highest = int(np.argmax(lower))
+        if not np.isfinite(lower[highest]):
+            return failed(name, wanted, "m", "both soles were never loaded at the same time")
         message = f"both soles loaded, t = {context.time[highest]:.2f} s"
         return at_least(name, float(lower[highest]), wanted, "m", message, when=None)
 

@@ -23,30 +23,35 @@ class Footholds:
         self, obstacles: tuple[Obstacle, ...], half_extents: Vector, *, ground: tuple[Tread, ...] = ()
     ) -> None:
         """`half_extents` (2,) of a sole [m]."""
-        self._obstacles = _Things([o for o in obstacles if o.bottom < REACH_UP])
+        self._obstacles = _Things(obstacles)
         self._ground = _Things(ground)
         self._sole = half_extents
 
     def free(self, position: Vector, yaw: float) -> bool:
-        """Whether a sole with its centre at `position` (2,) [m] stands clear of every obstacle."""
+        """Whether a sole with its centre at `position` (2,) [m] is carried as a whole and clear of every obstacle."""
         carried, clear = (
             foot_corners(position=position, yaw=yaw, half_extents=self._sole + margin)
             for margin in (EDGE_MARGIN, MARGIN)
         )
-        return self._level(carried) is not None and not self._obstacles.under(clear)
+        level = self._level(carried)
+        return level is not None and not self._in_way(clear, level)
 
     def height(self, position: Vector, yaw: float) -> float | None:
         """Height of the ground [m] under a sole with its centre at `position` (2,) [m]; None over an edge."""
         return self._level(foot_corners(position=position, yaw=yaw, half_extents=self._sole))
 
-    def on_ground(self, place: Vector, yaw: float, *, stance: Vector, stance_yaw: float) -> Vector:
+    def on_ground(self, place: Vector, yaw: float, *, stance: float, own: float | None) -> Vector:
         """(3,) [m] a sole's centre at `place` (2,): as high as the ground is said to be there.
 
-        On the level that carries the foot at `stance` (3,), and over an edge, it is as high as that one.
+        On the level that carries the other foot, and over an edge, it is as high as that one.
+
+        Args:
+            stance: measured height of the other foot [m].
+            own: what its `height` is said to be [m].
         """
-        own, level = self.height(stance[:2], stance_yaw), self.height(place, yaw)
-        if level is None or level == own or (own is None and abs(level - stance[2]) < UNEVEN):
-            level = float(stance[2])
+        level = self.height(place, yaw)
+        if level is None or level == own or (own is None and abs(level - stance) < UNEVEN):
+            level = stance
         return np.array([*place, level])
 
     def _level(self, sole: Vector) -> float | None:
@@ -57,9 +62,17 @@ class Footholds:
         highest = max(under, key=lambda tread: tread.top)
         return highest.top if _inside(sole, highest.corners) else None
 
-    def obstructed(self, start: Vector, end: Vector, yaw: float) -> bool:
-        """Whether an obstacle is in a sole's straight way from `start` to `end` (2,) [m], or too near to its end."""
-        return bool(self._obstacles.under(self._swept(start, end, yaw, MARGIN)))
+    def obstructed(self, start: Vector, end: Vector, yaw: float, *, lowest: float) -> bool:
+        """Whether an obstacle is in a sole's straight way from `start` to `end` (2,) [m], or too near to its end.
+
+        `lowest` [m]: the lower one of the heights of both ends.
+        """
+        return bool(self._in_way(self._swept(start, end, yaw, MARGIN), lowest))
+
+    def _in_way(self, polygon: Vector, lowest: float) -> list[Obstacle]:
+        """The obstacles that a foot over `polygon` (k, 2) [m] meets, not those over its head or under the ground."""
+        things = self._obstacles.under(polygon)
+        return [o for o in things if isinstance(o, Obstacle) and o.bottom - lowest < REACH_UP and o.top > lowest]
 
     def crossed(self, start: Vector, end: Vector, yaw: float, *, lowest: float = 0.0) -> float | None:
         """Height to lift a sole by on its straight way from `start` to `end` (2,) [m]: 0 when nothing is in the way.
@@ -69,12 +82,9 @@ class Footholds:
         None: something is too high to step over. Where a foot has landed it may stand closer than the margin to what it
         leaves: that is no longer in its way.
         """
-        things = [
-            *self._obstacles.under(self._swept(start, end, yaw, MARGIN)),
-            *self._ground.under(self._swept(start, end, yaw, EDGE_MARGIN)),
-        ]
-        tops = [thing.top - lowest for thing in things]
-        tops = [top for top in tops if top > LEVEL]
+        treads = self._ground.under(self._swept(start, end, yaw, EDGE_MARGIN))
+        tops = [tread.top - lowest for tread in treads if tread.top - lowest > LEVEL]
+        tops += [o.top - lowest for o in self._in_way(self._swept(start, end, yaw, MARGIN), lowest)]
         if any(top > REACH_UP for top in tops):
             return None
         return max(tops) + CLEARANCE if tops else 0.0
@@ -102,20 +112,23 @@ class _Things:
         return [self._things[i] for i in near if _overlap(polygon, self._things[i].corners)]
 
 
+def _normals(polygon: Vector) -> Vector:
+    """Outward normals (k, 2) of a convex polygon's edges, counter-clockwise, as long as the edges."""
+    edges = np.concatenate([polygon[1:], polygon[:1]]) - polygon
+    return np.column_stack([edges[:, 1], -edges[:, 0]])
+
+
 def _inside(inner: Vector, outer: Vector) -> bool:
     """Whether all points (n, 2) are in a convex polygon (k, 2), counter-clockwise."""
-    edges = np.roll(outer, -1, axis=0) - outer
-    normals = np.column_stack([edges[:, 1], -edges[:, 0]])
+    normals = _normals(outer)
     return bool((inner @ normals.T <= np.einsum("ki,ki->k", normals, outer) + 1e-9).all())
 
 
 def _overlap(a: Vector, b: Vector) -> bool:
     """Whether two convex polygons (n, 2), counter-clockwise, overlap (separating axes)."""
     for polygon in (a, b):
-        edges = np.roll(polygon, -1, axis=0) - polygon
-        normals = np.column_stack([edges[:, 1], -edges[:, 0]])
-        for normal in normals:
-            along_a, along_b = a @ normal, b @ normal
-            if along_a.max() <= along_b.min() or along_b.max() <= along_a.min():
-                return False
+        normals = _normals(polygon).T
+        along_a, along_b = a @ normals, b @ normals
+        if ((along_a.max(axis=0) <= along_b.min(axis=0)) | (along_b.max(axis=0) <= along_a.min(axis=0))).any():
+            return False
     return True

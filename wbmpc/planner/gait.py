@@ -105,14 +105,15 @@ class Gait:
         """Move the clock on by dt [s] at `rate` (0 … 1: the gate).
 
         Args:
-            stay: begin no steps while standing.
+            stay: lift no foot for a stride, and begin no walk.
             soles, yaws: measured (2, 3) [m], (2,) [rad]: a foot stands where it has landed.
             loads: (2,) measured vertical forces [N].
             zmp: (2,) measured centre of the feet's pressure [m]: a stride waits until it is in the sole that stays.
         """
         settings = self._settings
         if self.phase != SupportPhase.SINGLE:
-            wanted = None if stay and self.step is None else self._stepping.next(self.feet, time)
+            may = not stay or (self.step is not None and self.step.adaptable)  # nobody stops in the middle of a walk
+            wanted = self._stepping.next(self.feet, time) if may else None
             if wanted is None:
                 self.phase, self.step = SupportPhase.STAND, None
                 return

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
 import numpy as np
 
 from wbmpc.planner.footholds import Footholds
@@ -15,6 +18,16 @@ WORTH_A_STEP = 0.012  # [m] a foot that gets so much farther has moved
 SEARCH_STEP = 0.005  # [m] between the places ahead that are tried for a foot
 WIDER = (0.0, 0.01, -0.01, 0.02, 0.03)  # [m] more than the usual width, tried one after the other
 MOST_FOUND = 64  # steps that are remembered
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a foot might go."""
+
+    ahead: float  # [m] of the stance foot, in the direction of the journey
+    position: Vector  # (3,) [m]
+    lift: float | None  # [m] see `Footholds.crossed`
+    free: bool  # see `Footholds.free`
 
 
 class Journey:
@@ -38,89 +51,106 @@ class Journey:
             self._found[key] = self._look(feet)
         return self._found[key]
 
+    def arrived(self, feet: Feet) -> bool:
+        """Whether the feet stand at the place, side by side."""
+        rest = plane_rotation(feet.heading).T @ (np.array(self.task.target) - feet.positions[:, :2].mean(axis=0))
+        return float(np.abs(rest).max()) < ALIGNED and feet.aligned
+
     def _look(self, feet: Feet) -> Footstep | None:
         """The nearest free foothold ahead, beyond an obstacle when there is none before it.
 
         The foot that goes over an obstacle goes no further than it must, and the other one closes up behind it: the
-        shorter the stride, the less the hands have to help. Before an edge both feet go up to it.
+        shorter the stride, the less the hands have to help. Before an edge both feet go up to it. Where a place is
+        taken, one a little wider is, or one straight ahead instead of towards a goal that is aside.
         """
+        if self.arrived(feet):
+            return None
         task, settings = self.task, self._settings
         turn = plane_rotation(feet.heading)
         rest = turn.T @ (np.array(task.target) - feet.positions[:, :2].mean(axis=0))
-        if float(np.abs(rest).max()) < ALIGNED and feet.aligned:
-            return None
         side = (0 if rest[1] >= 0.0 else 1) if feet.last < 0 else 1 - feet.last
-        stance = feet.positions[1 - side][:2]
         across = SIDE_SIGN[side] * settings.step_width
-        goal = turn.T @ (np.array(task.target) - stance) + [0.0, across / 2]
-        wanted = np.array([np.clip(goal[0], -task.step_length, task.step_length), across])
+        goal = turn.T @ (np.array(task.target) - feet.positions[1 - side][:2]) + [0.0, across / 2]
         outwards = sorted((0.0, SIDE_SIGN[side] * task.step_length))
-        wanted[1] += min(max(goal[1] - across, outwards[0]), outwards[1])
+        aside = min(max(goal[1] - across, outwards[0]), outwards[1])
         forward = 1.0 if rest[0] >= 0.0 else -1.0
-        step: Footstep | None = None
-        for wider in WIDER:  # somewhere beyond what is in the way, else as far as the usual width leads
-            offset = np.array([wanted[0], wanted[1] + SIDE_SIGN[side] * wider])
-            other, over = self._ahead(feet, side, offset, forward)
-            if over or wider == 0.0:
-                step = other
-            if over:
-                break
-        return step
+        fallback: _Place | None = None
+        for sideways in (aside, 0.0) if abs(aside) > WORTH_A_STEP else (aside,):
+            for wider in WIDER:
+                if settings.step_width + wider < settings.narrowest:
+                    continue
+                find = self._finder(feet, side, forward, across + sideways + SIDE_SIGN[side] * wider)
+                place, on = self._ahead(feet, side, find, goal=forward * float(goal[0]), aside=abs(sideways))
+                if on and place is not None:
+                    return self._step(feet, side, place)
+                if wider == 0.0 and sideways == aside:
+                    fallback = place  # as far as it goes, before what cannot be crossed
+        return None if fallback is None else self._step(feet, side, fallback)
 
-    def _ahead(self, feet: Feet, side: int, wanted: Vector, forward: float) -> tuple[Footstep | None, bool]:
-        """The step to `wanted` (2,) [m] from the stance foot, or to where the way `forward` (±1) leads instead.
+    def _finder(self, feet: Feet, side: int, forward: float, across: float) -> Callable[[float], _Place]:
+        """What there is `ahead` [m] of the stance foot, `across` [m] to its left."""
+        footholds, yaw, stance, start = self._footholds, feet.heading, feet.positions[1 - side], feet.positions[side]
+        turn, own = plane_rotation(yaw), footholds.height(stance[:2], float(feet.yaws[1 - side]))
 
-        And whether the foot gets on from there, or stands before what it cannot cross.
+        def find(ahead: float) -> _Place:
+            there = stance[:2] + turn @ np.array([forward * ahead, across])
+            position = footholds.on_ground(there, yaw, stance=float(stance[2]), own=own)
+            lift = footholds.crossed(start[:2], there, yaw, lowest=float(min(start[2], position[2])))
+            return _Place(ahead, position, lift, footholds.free(there, yaw))
+
+        return find
+
+    def _ahead(
+        self, feet: Feet, side: int, find: Callable[[float], _Place], *, goal: float, aside: float
+    ) -> tuple[_Place | None, bool]:
+        """The place to go to, and whether the foot gets on from there, or stands before what it cannot cross.
+
+        `goal` [m]: how far the journey's end is ahead of the stance foot; `aside` [m]: of a step to the side.
         """
-        task, settings, footholds = self.task, self._settings, self._footholds
-        yaw, turn = feet.heading, plane_rotation(feet.heading)
-        stance, start = feet.positions[1 - side], feet.positions[side]
+        task, start = self.task, feet.positions[side]
+        turn = plane_rotation(feet.heading)
 
-        def place(ahead: float) -> Vector:
-            there = stance[:2] + turn @ np.array([forward * ahead, wanted[1]])
-            return footholds.on_ground(there, yaw, stance=stance, stance_yaw=float(feet.yaws[1 - side]))
+        def moved(place: _Place) -> float:
+            return max(aside, float(abs((turn.T @ (place.position - start)[:2])[0])))
 
-        def lift(ahead: float) -> float | None:
-            end = place(ahead)
-            return footholds.crossed(start[:2], end[:2], yaw, lowest=float(min(start[2], end[2])))
-
-        def free(ahead: float) -> bool:
-            return footholds.free(place(ahead)[:2], yaw)
-
-        usual, ahead = forward * float(wanted[0]), 0.0
-        behind = -forward * float((turn.T @ (start - stance)[:2])[0])  # [m] the foot is behind the other one
-        tries = np.arange(0.0, task.longest_step + 1e-9, SEARCH_STEP).tolist()
-        if footholds.obstructed(start[:2], place(usual)[:2], yaw):  # the first place beyond it, or the last before
-            lifts = [lift(a) for a in tries]
-            beyond = [a for a, height in zip(tries, lifts, strict=True) if height and free(a)]
-            before = [a for a, height in zip(tries, lifts, strict=True) if height == 0.0]
-            over = bool(beyond)
-            if over:
-                ahead = beyond[0]
-            elif not before or (abs(before[-1] + behind) < SEARCH_STEP and feet.aligned):
+        usual = find(float(np.clip(goal, -task.step_length, task.step_length)))
+        tries = np.arange(0.0, task.longest_step + 1e-9, SEARCH_STEP)
+        lowest = float(min(start[2], usual.position[2]))
+        if self._footholds.obstructed(start[:2], usual.position[:2], feet.heading, lowest=lowest):
+            places = [find(ahead) for ahead in tries.tolist()]
+            beyond = _first(place for place in places if place.lift and place.free)
+            if beyond is not None:
+                return beyond, True
+            before = _first(place for place in reversed(places) if place.lift == 0.0 and place.free)
+            if before is None or (moved(before) < SEARCH_STEP and feet.aligned):
                 return None, False  # no way on from here
-            else:
-                ahead = before[-1]
-        elif free(usual):
-            ahead, over = usual, True
-        else:  # over the edge of a tread: up to it, or where that is no step to the first place behind it
-            places = [a for a in tries if free(a) and lift(a) is not None]
-            shorter, longer = [a for a in places if a <= usual], [a for a in places if a > usual]
-            over = bool(longer) or bool(shorter and shorter[-1] + behind > WORTH_A_STEP)
-            if not over:
-                return None, False
-            ahead = shorter[-1] if shorter and shorter[-1] + behind > WORTH_A_STEP else longer[0]
-        return (
-            Footstep(
-                side=side,
-                position=place(ahead),
-                yaw=yaw,
-                swing_time=task.swing_time,
-                double_support=settings.stride_double_support,
-                clearance=max(settings.step_height, lift(ahead) or 0.0),
-                lead=CAREFUL_LEAD,
-                adaptable=False,
-                task=self._index,
-            ),
-            over,
+            return before, False
+        if usual.free and usual.lift is not None:
+            return usual, True
+        # the edge of a tread: up to it, or where that is no step to the first place behind it
+        near, far = tries[tries < usual.ahead], tries[tries > usual.ahead]
+        shorter = _first(place for place in map(find, near[::-1].tolist()) if place.free and place.lift is not None)
+        if shorter is not None and moved(shorter) > WORTH_A_STEP:
+            return shorter, True
+        longer = _first(place for place in map(find, far.tolist()) if place.free and place.lift is not None)
+        if longer is not None and (abs(goal - longer.ahead) < abs(goal) or not feet.aligned):
+            return longer, True
+        return None, False
+
+    def _step(self, feet: Feet, side: int, place: _Place) -> Footstep:
+        settings = self._settings
+        return Footstep(
+            side=side,
+            position=place.position,
+            yaw=feet.heading,
+            swing_time=self.task.swing_time,
+            double_support=settings.stride_double_support,
+            clearance=max(settings.step_height, place.lift or 0.0),
+            lead=CAREFUL_LEAD,
+            adaptable=False,
+            task=self._index,
         )
+
+
+def _first(places: Iterable[_Place]) -> _Place | None:
+    return next(iter(places), None)

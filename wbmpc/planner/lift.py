@@ -93,8 +93,8 @@ class Lift:
 
     @property
     def hold_feet(self) -> bool:
-        """Whether the feet must stay where they are: what they are to do comes after the box is up."""
-        return self.phase not in (LiftPhase.CARRY, LiftPhase.DONE)
+        """Whether the feet must stay where they are: what they are to do they do with the box."""
+        return self.phase != LiftPhase.CARRY
 
     @property
     def progress(self) -> float:

@@ -65,7 +65,8 @@ class Stepping:
         side = ("left", "right").index(task.foot)
         settings, stance_yaw, footholds = self._settings, float(feet.yaws[1 - side]), self._footholds
         stance, start, target = feet.positions[1 - side], feet.positions[side], np.array(task.target)
-        position = footholds.on_ground(target, task.yaw, stance=stance, stance_yaw=stance_yaw)
+        own = footholds.height(stance[:2], stance_yaw)
+        position = footholds.on_ground(target, task.yaw, stance=float(stance[2]), own=own)
         crossed = footholds.crossed(start[:2], target, task.yaw, lowest=float(min(start[2], position[2])))
         return Footstep(
             side=side,
