@@ -7,6 +7,8 @@ import numpy as np
 from wbmpc.planner.settings import HeightSettings
 from wbmpc.signals import Vector
 
+UNBOUNDED = 0.3  # [m] d of a hand that does not bind the CoM
+
 
 def height_band(settings: HeightSettings, references: Vector, distance: Vector, plane: float) -> Vector:
     """Admissible band (N, 2) of the CoM height [m]: the legs' range, narrowed by |c_z − r_z| ≤ d of the hands.

@@ -92,8 +92,16 @@ class Lift:
         return self.phase in (LiftPhase.GRIP, LiftPhase.RAISE, LiftPhase.CARRY)
 
     @property
+    def lost(self) -> bool:
+        """Whether it was given up: nothing was there, or it slipped away."""
+        return self.phase in (LiftPhase.GIVE_UP, LiftPhase.DONE)
+
+    @property
     def hold_feet(self) -> bool:
-        """Whether the feet must stay where they are: what they are to do they do with the box."""
+        """Whether the feet must stay where they are: what they are to do they do with the box.
+
+        A stride that is under way when the box is lost is made, and no other.
+        """
         return self.phase != LiftPhase.CARRY
 
     @property

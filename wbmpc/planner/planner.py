@@ -266,11 +266,7 @@ class Planner:
         centre = feet.positions[:, :2].mean(axis=0) if stride is None else stride.stance_centre
         if stride is not None or self._gait.phase == SupportPhase.STAND:  # walking keeps the standing posture
             self._references.update_postures(
-                self._contacts,
-                feet=feet,
-                stride=stride,
-                centre=centre,
-                iterations=iterations,
+                self._contacts, feet=feet, stride=stride, centre=centre, iterations=iterations
             )
         self._contacts.improve_postures(
             soles=feet.positions, yaws=feet.yaws, centre=centre, iterations=iterations, everyone=everyone
@@ -295,7 +291,6 @@ class Planner:
         """
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
         margin = self._com.inset(walking=gait.walking)
-
         times, growth, com = self._preview.times, settings.zmp_margin_growth, self._course
 
         def preview(rate: float, margin: float) -> SupportPreview:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbmpc.planner.bands import horizontal_band
+from wbmpc.planner.bands import UNBOUNDED, horizontal_band
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.footstep import Feet
 from wbmpc.planner.lean import Lean
@@ -18,7 +18,6 @@ from wbmpc.rotations import angle_difference
 from wbmpc.signals import SIDES, HandMode, Vector
 
 REACH_FLOOR, FOOT_FLOOR = 0.12, 0.05  # [m] smallest d of hand and foot: neither pins the CoM to itself
-UNBOUNDED = 0.3  # [m] d of a hand without a reference
 SPENT = 0.02  # [m] palm error of a posture from which a contact does not reach
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
