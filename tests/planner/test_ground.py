@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from wbmpc.planner.footholds import CLEARANCE, EDGE_MARGIN, Footholds
 from wbmpc.planner.footstep import Feet
+from wbmpc.planner.gait import Gait, SupportPhase
 from wbmpc.planner.journey import SEARCH_STEP, WORTH_A_STEP
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support import convex_hull, foot_corners
@@ -252,3 +253,34 @@ def test_stairs_are_climbed_backward_and_in_any_direction() -> None:
             )
             assert made[-1].positions[:, :2].mean(axis=0) == pytest.approx(target, abs=0.02), (yaw, sign)
             assert max(f.positions[:, 2].min() for f in made) == pytest.approx(0.04)
+
+
+def test_the_preview_of_a_step_up_is_seen_on_the_plane_of_the_feet_that_stand() -> None:
+    """Every polygon is the soles' outline, seen from the CoM at that knot."""
+    treads = stairs(rise=0.03)
+    stepping = Stepping((GoTask(kind="go", target=(1.0, 0.0)),), SETTINGS, Footholds((), HALF, ground=treads))
+    feet = Feet(np.array([[0.03, 0.045, 0.0], [0.03, -0.045, 0.0]]), np.zeros(2), 1)
+    gait = Gait(SETTINGS, stepping, feet=feet, half_extents=HALF)
+    events: list[str] = []
+    args = dict(rate=1.0, soles=feet.positions, yaws=feet.yaws, loads=np.full(2, 17.0), zmp=np.array([0.03, -0.045]))
+    gait.advance(1.0, 0.01, **args, events=events)
+    assert gait.phase == SupportPhase.DOUBLE
+    step = gait.step
+    assert step is not None
+    assert step.position[2] == pytest.approx(0.03)
+    landed = SETTINGS.stride_double_support + step.swing_time  # [s] the first support is as long as any other
+    times = np.linspace(0.1, landed + 0.05, 30)
+    com = np.column_stack([np.linspace(0.03, 0.15, 30), np.zeros(30), np.linspace(0.25, 0.28, 30)])
+    preview = gait.preview(1.0, times, rate=1.0, margin=0.0, growth=0.0, com=com)
+    assert {polygon.plane_height for polygon in preview.polygons} == {0.0}
+    after = feet.after(step)
+    last = preview.polygons[-1]
+    places = []
+    for position in after.positions:
+        for corner in foot_corners(position=position[:2], yaw=0.0, half_extents=HALF):
+            ray = np.array([*corner, position[2]]) - com[-1]  # from the CoM through the corner down to the floor
+            places.append((com[-1] - ray * com[-1][2] / ray[2])[:2])
+    hull = convex_hull(np.array(places))
+    raised = foot_corners(position=after.positions[step.side][:2], yaw=0.0, half_extents=HALF)
+    assert last.vertices[:, 0].max() > raised[:, 0].max() + 0.005  # not merely seen from above
+    assert_allclose(sorted(map(tuple, last.vertices)), sorted(map(tuple, hull)), atol=1e-9)

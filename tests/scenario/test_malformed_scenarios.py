@@ -18,6 +18,14 @@ def second_task(task: str) -> str:
     return edited("disturbances:", f"  - {task}\ndisturbances:")
 
 
+def staircase(values: str) -> str:
+    """The base text with a staircase in which some keys are others."""
+    keys = dict(position="[1.0, 0.0]", steps="3", rise="0.02", depth="0.2", landing="0.3", width="0.5")
+    keys |= dict(item.split(": ") for item in values.split("; "))
+    block = ", ".join(f"{key}: {value}" for key, value in keys.items())
+    return edited("patches:\n", f"  staircase: {{{block}}}\npatches:\n")
+
+
 def after_a_lift(task: str) -> str:
     """The base text with a lift of a crate and then another task."""
     crate = "    crate: {kind: box, size: [0.1, 0.1, 0.1], position: [0.2, 0.0], mass: 0.2}\n"
@@ -519,6 +527,31 @@ MISTAKES = [
         ),
         "0.04}\nloop",
         "plant.ground_error: must be less than the height of the lowest walkable object (table, 0.03 m), got 0.04 m",
+    ),
+    (
+        "a staircase without steps",
+        staircase("steps: 0"),
+        "0, rise",
+        "world.staircase.steps: must be ≥ 1, got 0",
+    ),
+    (
+        "a staircase that goes down at once",
+        staircase("rise: -0.02"),
+        "-0.02",
+        "world.staircase.rise: must be > 0, got -0.02",
+    ),
+    (
+        "an object called like a tread",
+        staircase("rise: 0.03").replace("table", "tread_4"),
+        "tread_4",
+        "world.objects.tread_4: the name 'tread_4' is taken by one of world.staircase",
+    ),
+    (
+        "treads may vanish",
+        staircase("rise: 0.03").replace("mass_scale: 1.0", "ground_error: 0.03"),
+        "0.03}\nloop",
+        "plant.ground_error: must be less than the height of the lowest walkable object (the lowest tread, 0.03 m), "
+        "got 0.03 m",
     ),
     (
         "weightless",

@@ -169,6 +169,8 @@ class Gait:
         self._left = self.step.double_support + early if self.step else 0.0
         x, y = sole[:2]
         events.append(f"foot {SIDES[step.side]}: landed at ({x:.3f}, {y:.3f})")
+        if self.step is None and self._stepping.stopped_short(self.feet, time):
+            events.append("feet: no way on from here")
 
     # ------------------------------------------------------------------ over the horizon
 

@@ -56,6 +56,10 @@ class Stepping:
         command = self.command(time)
         return None if command is None else self._walk(feet, command)
 
+    def stopped_short(self, feet: Feet, time: float) -> bool:
+        """Whether `feet` that have no next step are not where they were to go."""
+        return any(journey.task.start <= time and not journey.arrived(feet) for journey in self._journeys)
+
     def velocity(self, feet: Feet, time: float) -> Vector:
         """Wanted CoM velocity (2,) in world [m/s]."""
         command = self.command(time)

@@ -36,7 +36,8 @@ class Interval:
     In a double support between two walking steps the ZMP may be in w_L P_L ⊕ w_R P_R, a sole that slides from one foot
     to the other with the shares w of the transfer (Scianca et al. 2020). That is less than the hull of both feet, and
     asks of a knot the same from whichever plan it is seen: with the hull, a knot next to a lift-off would promise the
-    plans before it more room than the plans after it find. It moves with the footsteps exactly as S (F − F_ref) says.
+    plans before it more room than the plans after it find. It moves with the footsteps exactly as S (F − F_ref) says,
+    but for soles at different heights: those are projected, with a factor near 1.
     """
 
     end: float  # [s from now]

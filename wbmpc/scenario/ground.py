@@ -19,5 +19,5 @@ class Tread:
 
 
 def resolve_ground(scenario: Scenario) -> tuple[Tread, ...]:
-    """All walkable boxes of a scenario, whether or not they are present, in the order of the file; then the tiles."""
+    """All walkable boxes of a scenario, whether or not they are present, in the file's order; then treads and tiles."""
     return tuple(Tread(corners=footprint(box), top=box.bottom + box.size[2]) for box in ground_boxes(scenario).values())

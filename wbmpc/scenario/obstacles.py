@@ -27,7 +27,7 @@ class Obstacle:
 def resolve_obstacles(scenario: Scenario) -> tuple[Obstacle, ...]:
     """Boxes that are neither walkable nor to be lifted, whether or not they are present, in the order of the file.
 
-    Tiles are walkable, none of them is an obstacle.
+    Treads and tiles are walkable, none of them is an obstacle.
     """
     lifted = {task.object for task in scenario.tasks if isinstance(task, LiftTask)}
     return tuple(

@@ -34,8 +34,8 @@ ALL_LAYERS = 2**31 - 1  # every robot geom that collides with anything collides 
 def build_world(scenario: Scenario, robot_path: Path) -> mujoco.MjModel:
     """Build the plant of a scenario.
 
-    World geoms are called `floor` and by the names of the objects and tiles; objects that are not `present` are left
-    out. The physics step is `scenario.loop.timestep`.
+    World geoms are called `floor` and by the names of objects, treads and tiles; objects that are not `present` are
+    left out. The physics step is `scenario.loop.timestep`.
 
     Raises:
         RobotError: MuJoCo cannot read or compile the robot's file.

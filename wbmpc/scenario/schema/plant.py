@@ -45,7 +45,7 @@ class PlantSettings(StrictModel):
     )
     ground_error: GroundError = Field(
         default=0.0,
-        description="Walkable objects and tiles are higher or lower by up to so much, uniformly at random [m].",
+        description="Walkable objects, treads and tiles are higher or lower by up to so much, uniformly at random [m].",
     )
 
 
