@@ -60,3 +60,13 @@ def test_a_forearm_inside_an_obstacle_is_out_of_reach() -> None:
     blocked = candidates(place, obstacles=(post,))
     refresh(blocked, SOLES, plans=60)
     assert blocked.reach_slack(next(c for c in blocked.all if c.hand == 0), polygon) < 0.0
+
+
+def test_where_nothing_is_nobody_looks_twice_where_a_palm_fell_short_it_may_once_more() -> None:
+    nothing_there, short = candidates(np.array([0.02, 0.2, 0.24])).all
+    nothing_there.gave_up("missing")
+    assert nothing_there.excluded
+    short.gave_up("unreached")
+    assert not short.excluded
+    short.gave_up("unreached")
+    assert short.excluded
