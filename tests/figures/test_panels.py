@@ -39,6 +39,9 @@ def test_a_robot_that_stands_still_shows_its_balance_along_one_axis() -> None:
 def test_panels_follow_from_what_happened() -> None:
     assert labels(still(com=sway(1, 0.03))) == ["y [cm]"]
     assert labels(still(com=sway(2, 0.03))) == ["z [cm]", "x [cm]"]
+    far = sway(0, 0.2)
+    assert labels(still(com=far + sway(2, 0.01) - still().com)) == ["x [cm]"]
+    assert labels(still(com=far + sway(2, 0.04) - still().com)) == ["z [cm]", "x [cm]"]  # up stairs and on
     pushed = still()
     pushed.push[20:30] = [0.0, 14.0, 0.0]
     assert labels(pushed) == ["x [cm]", "velocity [m/s]"]

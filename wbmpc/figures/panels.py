@@ -15,6 +15,7 @@ from wbmpc.signals import SIDES
 
 STEPPED = 0.03  # [m] a foot that travels farther has stepped
 EXCURSION = 0.015  # [m] the CoM's range along an axis that is worth a panel
+CLIMB = 0.05  # [m] of the CoM height that is shown whatever else moves
 SHIFT = 2e-3  # [m] a smaller ΔZ asks for no contact
 STANCE_SHARE = 0.1  # of a foot's largest load: less is a swing foot's touch
 LEAST_STANCE = 0.05  # [s] a shorter touch leaves no footprint
@@ -47,7 +48,7 @@ def panels_of(trace: Trace) -> list[Panel]:
         panels.append(Panel(draw_footprints, over_time=False, height=2.2))
     moved = [axis for axis in (0, 1) if com_range[axis] > EXCURSION]
     pushed, held = np.any(trace.push != 0), bool(trace.hand_contacts)
-    if com_range[2] > EXCURSION and com_range[2] > com_range[:2].max():
+    if com_range[2] > CLIMB or (com_range[2] > EXCURSION and com_range[2] > com_range[:2].max()):
         panels.append(Panel(draw_height))
     for axis in moved or [int(np.argmax(com_range[:2]))]:
         panels.append(Panel(lambda axes, trace, axis=axis: draw_balance(axes, trace, axis)))  # type: ignore[misc]
