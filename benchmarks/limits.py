@@ -86,7 +86,6 @@ LIMITS = {
     "lift_low": Limit("box_lift", "world.objects.box.size.2=%s", "m", 0.12, -0.01, 0.005),
     "lift_far": Limit("box_lift", "world.objects.box.position.0=%s", "m", 0.16, 0.01, 0.005),
     "stairs_rise": Limit("stairs", "world.staircase.rise=%s", "m", 0.03, 0.004, 0.004),
-    "uneven_untold": Limit("uneven", "plant.ground_error=%s", "m", 0.006, 0.004, 0.002),
     "uneven_told": Limit("uneven", "world.tiles.highest=%s", "m", 0.03, 0.01, 0.005),
     "carry_mass": Limit("box_stairs", "world.objects.box.mass=%s", "kg", 0.3, 0.1, 0.1),
     "carry_rise": Limit("box_stairs", "world.staircase.rise=%s", "m", 0.02, 0.005, 0.005),

@@ -17,7 +17,7 @@ ROBOT = BASE | {"model_contract", "robot", "kinematics"}
 SETTINGS = BASE | {"settings", "scenario"}
 CONTROLLER = ROBOT | SETTINGS | {"qp"}
 RECORDS = BASE | {"recorder"}
-LOOP = CONTROLLER | RECORDS | {"plant", "estimator", "planner", "tracker", "mailbox", "loop"}
+LOOP = CONTROLLER | RECORDS | {"initial", "plant", "estimator", "planner", "tracker", "mailbox", "loop"}
 
 # Component -> the components that it may import, itself included. signals <- robot <- {plant, estimator,
 # qp <- planner, tracker} <- loop <- session <- commands; checks see signals, recorder and the settings of the checks.
@@ -44,6 +44,7 @@ ALLOWED = {
     "figures": RECORDS | {"checks", "footage", "render", "rerun_sink", "figures"},
     "checks": RECORDS | ROBOT | {"settings", "checks"},
     "mailbox": BASE | {"planner", "mailbox"},
+    "initial": ROBOT | SETTINGS | {"initial"},
     "loop": LOOP,
     "realtime": LOOP | {"realtime"},
     "facts": ROBOT | SETTINGS | {"checks", "facts"},

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from short_run import ROBOT, finished, new_session, short, stand
 
-from wbmpc.loop import Session, initial_posture
+from wbmpc.errors import ScenarioError
+from wbmpc.initial import initial_posture
+from wbmpc.loop import Session
 from wbmpc.planner.planner import Planner
 from wbmpc.scenario import build_world, robot_path
 from wbmpc.session import run_scenario
@@ -192,3 +194,23 @@ def test_initial_posture_has_its_joints_and_its_soles_on_the_floor() -> None:
     assert qpos[7 + ROBOT.joint_index("left_knee")] == 0.9
     session, _ = new_session(scenario)
     assert session.plant.data.site("left_sole").xpos[2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("world", "message"),
+    [
+        (
+            {"staircase": {"position": [0, 0], "steps": 2, "rise": 0.03, "depth": 0.2, "landing": 0.3, "width": 0.5}},
+            r"the robot starts inside 'tread_0': its (left|right)_foot is \d+ mm deep in it",
+        ),
+        (
+            {"objects": {"wall": {"kind": "box", "size": [0.1, 1.0, 1.0], "position": [0.0, 0.0]}}},
+            r"the robot starts inside 'wall': its \w+ is \d+ mm deep in it",
+        ),
+    ],
+)
+def test_a_robot_that_starts_inside_of_something_is_refused(world: dict[str, Any], message: str) -> None:
+    with pytest.raises(ScenarioError, match=message) as raised:
+        new_session(stand(world=world))
+    assert raised.value.exit_code == 2
+    assert "\n" not in str(raised.value)

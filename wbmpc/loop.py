@@ -13,13 +13,14 @@ import mujoco
 import numpy as np
 
 from wbmpc.estimator import Estimator
+from wbmpc.initial import initial_posture
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world, resolve_ground, resolve_loads, resolve_obstacles, resolve_patches
-from wbmpc.signals import RobotState, Vector
+from wbmpc.signals import RobotState
 from wbmpc.tracker.tracker import Tracker
 
 DIVERGED = 1e6  # [rad/s, m/s] no robot moves so fast: the simulation has lost it
@@ -177,15 +178,3 @@ def no_garbage_collection() -> Iterator[None]:
     finally:
         if collecting:
             gc.enable()
-
-
-def initial_posture(scenario: Scenario, robot: Robot, model: mujoco.MjModel) -> Vector:
-    """MuJoCo configuration (nq,) at the start: the keyframe, the scenario's joints, the soles on the floor, objects."""
-    qpos = model.key(scenario.initial.keyframe).qpos.copy()
-    for name, angle in scenario.initial.joints.items():
-        qpos[7 + robot.joint_index(name)] = angle
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    qpos[2] -= min(data.site(f"{side}_sole").xpos[2] for side in ("left", "right"))
-    return qpos
