@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -17,6 +18,7 @@ from wbmpc.signals import Vector
 WORTH_A_STEP = 0.012  # [m] a foot that gets so much farther has moved
 SEARCH_STEP = 0.005  # [m] between the places ahead that are tried for a foot
 WIDER = (0.0, 0.01, -0.01, 0.02, 0.03)  # [m] more than the usual width, tried one after the other
+SHORT_STRIDE = 0.16  # [m] over an edge: before a longer one all widths are tried
 MOST_FOUND = 64  # steps that are remembered
 
 
@@ -75,16 +77,17 @@ class Journey:
         aside = min(max(goal[1] - across, outwards[0]), outwards[1])
         forward = 1.0 if rest[0] >= 0.0 else -1.0
         fallback: _Place | None = None
-        for sideways in (aside, 0.0) if abs(aside) > WORTH_A_STEP else (aside,):
-            for wider in WIDER:
-                if settings.step_width + wider < settings.narrowest:
-                    continue
-                find = self._finder(feet, side, forward, across + sideways + SIDE_SIGN[side] * wider)
-                place, on = self._ahead(feet, side, find, goal=forward * float(goal[0]), aside=abs(sideways))
-                if on and place is not None:
-                    return self._step(feet, side, place)
-                if wider == 0.0 and sideways == aside:
-                    fallback = place  # as far as it goes, before what cannot be crossed
+        shifts = (aside, 0.0) if abs(aside) > WORTH_A_STEP else (aside,)
+        for longest, sideways, wider in itertools.product((SHORT_STRIDE, task.longest_step), shifts, WIDER):
+            if settings.step_width + wider < settings.narrowest:
+                continue
+            find = self._finder(feet, side, forward, across + sideways + SIDE_SIGN[side] * wider)
+            ahead = forward * float(goal[0])
+            place, on = self._ahead(feet, side, find, goal=ahead, aside=abs(sideways), longest=longest)
+            if on and place is not None:
+                return self._step(feet, side, place)
+            if wider == 0.0 and sideways == aside:
+                fallback = place  # as far as it goes, before what cannot be crossed
         return None if fallback is None else self._step(feet, side, fallback)
 
     def _finder(self, feet: Feet, side: int, forward: float, across: float) -> Callable[[float], _Place]:
@@ -101,11 +104,12 @@ class Journey:
         return find
 
     def _ahead(
-        self, feet: Feet, side: int, find: Callable[[float], _Place], *, goal: float, aside: float
+        self, feet: Feet, side: int, find: Callable[[float], _Place], *, goal: float, aside: float, longest: float
     ) -> tuple[_Place | None, bool]:
         """The place to go to, and whether the foot gets on from there, or stands before what it cannot cross.
 
         `goal` [m]: how far the journey's end is ahead of the stance foot; `aside` [m]: of a step to the side.
+        `longest` [m]: step over an edge; over an obstacle it is the task's.
         """
         task, start = self.task, feet.positions[side]
         turn = plane_rotation(feet.heading)
@@ -128,7 +132,7 @@ class Journey:
         if usual.free and usual.lift is not None:
             return usual, True
         # the edge of a tread: up to it, or where that is no step to the first place behind it
-        near, far = tries[tries < usual.ahead], tries[tries > usual.ahead]
+        near, far = tries[tries < usual.ahead], tries[(tries > usual.ahead) & (tries <= longest)]
         shorter = _first(place for place in map(find, near[::-1].tolist()) if place.free and place.lift is not None)
         if shorter is not None and moved(shorter) > WORTH_A_STEP:
             return shorter, True
