@@ -260,6 +260,7 @@ def test_margins_of_a_preview_grow() -> None:
 
 @settings(max_examples=20, deadline=None)
 @given(command=commands, ticks=st.integers(60, 400), x=st.floats(-0.02, 0.02), y=st.floats(-0.02, 0.02))
+@example(command=(0.125, 0.0, 1e-8), ticks=71, x=0.0, y=0.0)  # sides of the hull that are straight but for rounding
 def test_rows_move_with_the_footsteps(command: Velocity, ticks: int, x: float, y: float) -> None:
     """If the present swing lands (x, y) off and the later steps follow, the moved rows are the feet's own.
 

@@ -9,6 +9,7 @@ import numpy as np
 from wbmpc.signals import Vector
 
 PROJECTIONS = 20
+COLLINEAR = 1e-9  # [m²] twice the area of three points on one line: ten times what the order's rounding lets through
 UNEVEN = 0.005  # [m] smaller differences of two soles' heights are the estimate's
 MAX_EDGES = 8  # two rectangles have a hull of at most eight edges
 
@@ -36,7 +37,7 @@ def convex_hull(points: Vector) -> Vector:
         for p in sequence:
             while len(hull) >= 2:
                 (ax, ay), (bx, by) = hull[-2], hull[-1]
-                if (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax) > 1e-12:
+                if (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax) > COLLINEAR:
                     break
                 hull.pop()
             hull.append(p)
