@@ -17,8 +17,7 @@ class Carry:
     def __init__(self, palms: Vector, *, com: Vector, heading: float) -> None:
         """Keep the places that `palms` (2, 3) have beside the CoM (3,) [m] when the feet have this `heading` [rad]."""
         self._places = (palms - com) @ level_frame(heading)  # (2, 3) [m] in the frame of the heading
-        self._com, self._course = np.zeros((3, 3)), np.tile(com, (1, 1))
-        self._turn, self._yaw_rate = level_frame(heading), 0.0
+        self.follow(np.column_stack([com, np.zeros((3, 2))]), com[None], heading=heading, yaw_rate=0.0)
 
     def follow(self, com: Vector, course: Vector, *, heading: float, yaw_rate: float) -> None:
         """Take in the planned CoM: its state (3, 3) now, its course (N, 3) [m] over the horizon; the feet's heading."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -15,6 +16,8 @@ REACH_UP = 0.10  # [m] obstacles that begin higher are not in a foot's way; thos
 LEVEL = 0.002  # [m] steps up or down that are none
 CLEARANCE = 0.025  # [m] of a swing foot over what it steps over
 
+Thing = TypeVar("Thing", bound=Obstacle | Tread)
+
 
 class Footholds:
     """Obstacles and treads as the feet see them; where there is neither, there is the floor."""
@@ -23,8 +26,8 @@ class Footholds:
         self, obstacles: tuple[Obstacle, ...], half_extents: Vector, *, ground: tuple[Tread, ...] = ()
     ) -> None:
         """`half_extents` (2,) of a sole [m]."""
-        self._obstacles = _Things(obstacles)
-        self._ground = _Things(ground)
+        self._obstacles: _Footprints[Obstacle] = _Footprints(obstacles)
+        self._ground: _Footprints[Tread] = _Footprints(ground)
         self._sole = half_extents
 
     def free(self, position: Vector, yaw: float) -> bool:
@@ -71,8 +74,7 @@ class Footholds:
 
     def _in_way(self, polygon: Vector, lowest: float) -> list[Obstacle]:
         """The obstacles that a foot over `polygon` (k, 2) [m] meets, not those over its head or under the ground."""
-        things = self._obstacles.under(polygon)
-        return [o for o in things if isinstance(o, Obstacle) and o.bottom - lowest < REACH_UP and o.top > lowest]
+        return [o for o in self._obstacles.under(polygon) if o.bottom - lowest < REACH_UP and o.top > lowest]
 
     def crossed(self, start: Vector, end: Vector, yaw: float, *, lowest: float = 0.0) -> float | None:
         """Height to lift a sole by on its straight way from `start` to `end` (2,) [m]: 0 when nothing is in the way.
@@ -95,15 +97,15 @@ class Footholds:
         return convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in ends]))
 
 
-class _Things:
+class _Footprints(Generic[Thing]):
     """Things on the floor, found by where they are."""
 
-    def __init__(self, things: Sequence[Obstacle | Tread]) -> None:
+    def __init__(self, things: Sequence[Thing]) -> None:
         self._things = things
         corners = np.array([thing.corners for thing in things]).reshape(-1, 4, 2)
         self._lower, self._upper = corners.min(axis=1), corners.max(axis=1)  # (n, 2) [m]
 
-    def under(self, polygon: Vector) -> list[Obstacle | Tread]:
+    def under(self, polygon: Vector) -> list[Thing]:
         """Those whose footprints overlap a convex `polygon` (k, 2) [m], counter-clockwise."""
         if not self._things:
             return []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,10 +122,10 @@ class Journey:
         lowest = float(min(start[2], usual.position[2]))
         if self._footholds.obstructed(start[:2], usual.position[:2], feet.heading, lowest=lowest):
             places = [find(ahead) for ahead in tries.tolist()]
-            beyond = _first(place for place in places if place.lift and place.free)
+            beyond = next((place for place in places if place.lift and place.free), None)
             if beyond is not None:
                 return beyond, True
-            before = _first(place for place in reversed(places) if place.lift == 0.0 and place.free)
+            before = next((place for place in reversed(places) if place.lift == 0.0 and place.free), None)
             if before is None or (moved(before) < SEARCH_STEP and feet.aligned):
                 return None, False  # no way on from here
             return before, False
@@ -133,10 +133,12 @@ class Journey:
             return usual, True
         # the edge of a tread: up to it, or where that is no step to the first place behind it
         near, far = tries[tries < usual.ahead], tries[(tries > usual.ahead) & (tries <= longest)]
-        shorter = _first(place for place in map(find, near[::-1].tolist()) if place.free and place.lift is not None)
+        shorter = next(
+            (place for place in map(find, near[::-1].tolist()) if place.free and place.lift is not None), None
+        )
         if shorter is not None and moved(shorter) > WORTH_A_STEP:
             return shorter, True
-        longer = _first(place for place in map(find, far.tolist()) if place.free and place.lift is not None)
+        longer = next((place for place in map(find, far.tolist()) if place.free and place.lift is not None), None)
         if longer is not None and (abs(goal - longer.ahead) < abs(goal) or not feet.aligned):
             return longer, True
         return None, False
@@ -154,7 +156,3 @@ class Journey:
             adaptable=False,
             task=self._index,
         )
-
-
-def _first(places: Iterable[_Place]) -> _Place | None:
-    return next(iter(places), None)

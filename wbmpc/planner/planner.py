@@ -245,8 +245,8 @@ class Planner:
             com=self._measured.com,
             events=events,
         )
-        stepping = self._gait.stride is not None
-        self._tasks.go_along(self._com.value, self._course, self._gait.soles(self._gate), stepping=stepping)
+        if self._tasks.takes_along(stepping=self._gait.stride is not None):
+            self._tasks.go_along(self._com.value, self._course, self._gait.soles(self._gate))
         contacts.advance(
             dt,
             palms=self._measured.palms,

@@ -73,11 +73,15 @@ class Tasks:
             if task.progress.phase != before:
                 events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
 
-    def go_along(self, com: Vector, course: Vector, soles: SoleReferences, *, stepping: bool) -> None:
-        """What is carried goes with the CoM from the first stride on; see `Carry.follow`."""
-        if self.lift is not None and (stepping or self.lift.carry is not None):
-            heading, yaw_rate = float(soles.yaws.mean()), float(soles.yaw_rates.mean())
-            self.lift.go_along(com, course, heading=heading, yaw_rate=yaw_rate)
+    def takes_along(self, *, stepping: bool) -> bool:
+        """Whether something that is carried goes with the CoM: from the first stride on."""
+        return self.lift is not None and (stepping or self.lift.carry is not None)
+
+    def go_along(self, com: Vector, course: Vector, soles: SoleReferences) -> None:
+        """See `Carry.follow`; the heading is that of the feet's references, `soles`."""
+        assert self.lift is not None
+        heading, yaw_rate = float(soles.yaws.mean()), float(soles.yaw_rates.mean())
+        self.lift.go_along(com, course, heading=heading, yaw_rate=yaw_rate)
 
     @property
     def hold_feet(self) -> bool:
