@@ -12,7 +12,7 @@ PACKAGE = ROOT / "wbmpc"
 FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 300
 
-BASE = {"signals", "errors", "strict", "rotations"}
+BASE = {"signals", "errors", "strict", "rotations", "jit"}
 ROBOT = BASE | {"model_contract", "robot", "kinematics"}
 SETTINGS = BASE | {"settings", "scenario"}
 CONTROLLER = ROBOT | SETTINGS | {"qp"}
@@ -27,6 +27,7 @@ ALLOWED = {
     "errors": BASE,
     "strict": BASE,
     "rotations": BASE,
+    "jit": BASE,
     "model_contract": ROBOT,
     "robot": ROBOT,
     "kinematics": ROBOT,
