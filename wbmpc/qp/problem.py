@@ -68,6 +68,18 @@ class QuadraticProgram:
         self.x_lower[self.binary], self.x_upper[self.binary] = 0.0, 1.0
         self._matrix_data = (self.hessian.reshape(-1), self.matrix.reshape(-1))
 
+    def head(self, rows: int) -> QuadraticProgram:
+        """The problem with its first `rows` rows only, in the same memory: what is written to one is in the other."""
+        part, n = object.__new__(QuadraticProgram), self.variables
+        part.hessian, part.gradient, part.matrix = self.hessian, self.gradient, self.matrix[:rows]
+        part.all_lower, part.all_upper = self.all_lower[: n + rows], self.all_upper[: n + rows]
+        part.lower, part.upper = part.all_lower[n:], part.all_upper[n:]
+        part.x_lower, part.x_upper = part.all_lower[:n], part.all_upper[:n]
+        part.soft_weight, part.soft_rows = self.soft_weight[:rows], self.soft_rows[self.soft_rows < rows]
+        part.binary = self.binary
+        part._matrix_data = (part.hessian.reshape(-1), part.matrix.reshape(-1))
+        return part
+
     def __setattr__(self, name: str, value: object) -> None:
         """Refuse to rebind an array: `problem.lower = b` would leave the solvers looking at the old one."""
         if getattr(self, name, value) is not value:

@@ -6,6 +6,8 @@ Weights are in [cost / (m/s²)²] for positions and [cost / (rad/s²)²] for rot
 
 from __future__ import annotations
 
+from typing import Literal
+
 from pydantic import Field
 
 from wbmpc.strict import StrictModel
@@ -14,6 +16,9 @@ from wbmpc.strict import StrictModel
 class TrackerSettings(StrictModel):
     """The scenario's `tracker:` block."""
 
+    assembly: Literal["fused", "plain"] = Field(
+        "fused", description="who writes the program: compiled code, or the numpy code that it is checked against"
+    )
     qp_backend: str = Field("daqp", description="QP backend: daqp, osqp or any name of qpsolvers")
 
     com_stiffness: float = Field(60.0, ge=0, description="[1/s²]")
