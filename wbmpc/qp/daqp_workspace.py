@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from wbmpc.qp.problem import QuadraticProgram
 from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
+from wbmpc.qp.verdicts import closes_duality_gap
 from wbmpc.signals import SolveStatus, Vector
 
 ITERATION_LIMIT = 2000
@@ -85,12 +86,10 @@ class DaqpWorkspace:
         large change of the data, a warm-started daqp 0.11 now and then stops at once with multipliers of the wrong
         sign: feasible, far from optimal, and reported as optimal.
         """
-        active = multiplier.nonzero()[0]
-        value = multiplier[active]
-        bound = np.where(value > 0.0, self.problem.all_upper[active], self.problem.all_lower[active])
-        dual = float(value.dot(bound))
-        linear = float(self.problem.gradient.dot(x))
-        return abs(2.0 * cost - linear + dual) <= DUALITY_GAP * (1.0 + abs(cost) + abs(linear) + abs(dual))
+        problem = self.problem
+        return closes_duality_gap(
+            *(x, cost, multiplier, problem.gradient, problem.all_lower, problem.all_upper, DUALITY_GAP)
+        )
 
 
 def soft_sense(problem: QuadraticProgram) -> NDArray[np.intc]:

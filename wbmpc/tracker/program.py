@@ -7,6 +7,7 @@ import numpy as np
 from wbmpc.qp import QuadraticProgram
 from wbmpc.robot import Robot
 from wbmpc.signals import Vector
+from wbmpc.tracker.answer import joint_torque, motion_and_wrenches
 from wbmpc.tracker.clearance import CLEARANCE_ROWS
 from wbmpc.tracker.constraints import PALM_ROWS, PRESSURE_ROWS, WRENCH_ROWS, pressure_rows, sole_wrench_rows
 from wbmpc.tracker.settings import TrackerSettings
@@ -55,3 +56,13 @@ class TrackerProgram:
         self.torque_offset = np.zeros(nj)
         self.torque_lower, self.torque_upper = np.zeros(nj), np.zeros(nj)  # the servo's line at this speed
         self.contact_rotation = np.zeros((4, 3, 3))  # soles, then palms: contact frame to world
+
+    def torque(self, y: Vector, *, tolerance: float, out: Vector) -> bool:
+        """Write the torques (nj,) of y (n,); returns whether one is within `tolerance` [N·m] of its bound or beyond."""
+        return joint_torque(
+            *(y, self.torque_matrix, self.torque_offset, self.torque_lower, self.torque_upper, tolerance, out)
+        )
+
+    def recover(self, y: Vector, acceleration: Vector, wrench: Vector, palm: Vector) -> None:
+        """Write v̇ (nv,), the soles' wrenches (2, 6) and the palms' forces (2, 3) in world of y (n,)."""
+        motion_and_wrenches(*(y, self.base_map, self.base_offset, self.contact_rotation), *(acceleration, wrench, palm))

@@ -26,6 +26,9 @@ class TouchReflex:
         Args:
             palm_force: (2, 3) sensed, in world [N].
         """
+        if max(setpoint.hand_urgency.tolist()) <= HURRIED:  # nearly every tick
+            self._touched = [False, False]
+            return setpoint
         for side in range(2):
             hurried = int(setpoint.hand_mode[side]) == HandMode.MOVE and setpoint.hand_urgency[side] > HURRIED
             normal_force = float(palm_force[side] @ setpoint.hand_normal[side])

@@ -57,17 +57,15 @@ class Tracker:
     def solve(self, state: RobotState, setpoint: Setpoint) -> TorqueCommand:
         """Torques for one tick. Never raises for a failed solve: see the class."""
         start = perf_counter()
-        program, nj = self._program, self._robot.nj
+        program = self._program
         self._assembly.build(state, self._reflex.apply(setpoint, state.palm_force_in_world))
         lower, upper = program.torque_lower, program.torque_upper
-        workspace = self._full if self._bound else self._relaxed
-        solution = workspace.solve()
-        torque = program.torque_matrix.dot(solution.x)
-        torque += program.torque_offset
-        bound = bool(((torque > upper - BINDING) | (torque < lower + BINDING)).any())
+        solution = (self._full if self._bound else self._relaxed).solve()
+        torque = np.empty(self._robot.nj)
+        bound = program.torque(solution.x, tolerance=BINDING, out=torque)
         if bound and not self._bound and solution.solved:
             solution = self._full.solve()
-            np.add(program.torque_matrix.dot(solution.x), program.torque_offset, out=torque)
+            program.torque(solution.x, tolerance=BINDING, out=torque)
         self._bound = bound
         if not solution.solved:
             self._assembly.forget()
@@ -81,17 +79,10 @@ class Tracker:
                 solve_time=perf_counter() - start,
                 fallback=True,
             )
-        y = solution.x
-        acceleration = np.empty(self._robot.nv)
-        acceleration[:6] = program.base_map.dot(y)
-        acceleration[:6] += program.base_offset
-        acceleration[6:] = y[:nj]
         np.minimum(np.maximum(torque, lower, out=torque), upper, out=torque)
         self._torque = torque
-        R = program.contact_rotation
-        force = y[nj:].reshape(6, 3, 1)
-        wrench = (R[[0, 0, 1, 1]] @ force[:4]).reshape(2, 6)
-        palm = (R[2:] @ force[4:]).reshape(2, 3)
+        acceleration, wrench, palm = np.empty(self._robot.nv), np.empty((2, 6)), np.empty((2, 3))
+        program.recover(solution.x, acceleration, wrench, palm)
         return TorqueCommand(
             torque=torque,
             acceleration=acceleration,
