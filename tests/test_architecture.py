@@ -13,7 +13,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 300
 
 BASE = {"signals", "errors", "strict", "rotations", "jit"}
-ROBOT = BASE | {"model_contract", "robot", "kinematics"}
+ROBOT = BASE | {"model_contract", "robot", "kinematics", "frame_terms"}
 SETTINGS = BASE | {"settings", "scenario"}
 CONTROLLER = ROBOT | SETTINGS | {"qp"}
 RECORDS = BASE | {"recorder"}
@@ -31,10 +31,12 @@ ALLOWED = {
     "model_contract": ROBOT,
     "robot": ROBOT,
     "kinematics": ROBOT,
+    "frame_terms": ROBOT,
     "settings": BASE | {"settings"},  # every settings.py: what a scenario may write for the package that it stands in
     "scenario": ROBOT | SETTINGS,
     "plant": ROBOT | SETTINGS | {"plant"},  # knows nothing of the controller
-    "estimator": ROBOT | SETTINGS | {"estimator"},
+    "estimator": ROBOT | SETTINGS | {"estimator", "estimator_kernel"},
+    "estimator_kernel": ROBOT | {"estimator_kernel"},
     "qp": BASE | {"qp"},
     "planner": CONTROLLER | {"planner"},  # knows nothing of the plant or of the tracker
     "tracker": CONTROLLER | {"tracker"},

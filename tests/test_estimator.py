@@ -9,7 +9,10 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from plain_estimator import PlainEstimator
 from short_run import ROBOT, new_plant, stand
 
 from wbmpc.estimator import Estimator
@@ -274,3 +277,30 @@ def test_without_feet_the_accelerometer_carries_on() -> None:
     R = pin.Quaternion(last.q[3:7]).matrix()
     assert_allclose(R @ last.v[:3] - first.v[:3], fall, atol=0.03)
     assert last.mass_scale == 1.0  # no feet, no news of the mass
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), upside=st.sampled_from([0.1, 1.0, 3.0]))
+def test_the_plain_estimator_says_the_same(seed: int, upside: float) -> None:
+    """Anything the sensors may say, for 20 ticks: feet land and lift, the base turns over."""
+    rng = np.random.default_rng(seed)
+    estimators = [make(ROBOT, q=ROBOT.home_q, step=STEP) for make in (Estimator, PlainEstimator)]
+    for tick in range(20):
+        wrench = rng.normal(scale=3.0, size=(2, 6))
+        wrench[:, 2] = rng.choice([0.0, 2.9, 3.1, 20.0], size=2)
+        measurement = Measurement(
+            time=STEP * tick,
+            joint_position=rng.uniform(ROBOT.joint_lower, ROBOT.joint_upper),
+            joint_velocity=rng.normal(size=ROBOT.nj),
+            imu_quaternion=np.array([1.0, 0.0, 0.0, 0.0]) + upside * rng.normal(size=4),
+            imu_gyro=rng.normal(size=3),
+            imu_accelerometer=rng.normal(scale=10.0, size=3),
+            sole_wrench_in_world=wrench,
+            palm_force_in_world=rng.normal(size=(2, 3)),
+        )
+        one, other = (estimator.update(measurement) for estimator in estimators)
+        same_sign = np.sign(one.q[3:7] @ other.q[3:7])
+        assert_allclose(one.q[3:7], same_sign * other.q[3:7], atol=1e-12)
+        assert_allclose(np.delete(one.q, slice(3, 7)), np.delete(other.q, slice(3, 7)), atol=1e-11)
+        assert_allclose(one.v, other.v, atol=1e-10)
+        assert one.mass_scale == pytest.approx(other.mass_scale, abs=1e-13)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from wbmpc.frame_terms import chains_of
 from wbmpc.robot import Robot
 from wbmpc.signals import RobotState, Setpoint
 from wbmpc.tracker.clearance import CLEARANCE_ROWS
@@ -59,7 +59,7 @@ class FusedAssembly:
             *(base.rotation, base.translation, tuple(pose[f].translation for f in frames)),
             *(tuple(pose[f].rotation for f in robot.sole_frames), pose[robot.torso_frame].rotation),
         )
-        chains, lengths = _chains(self._model, frames)
+        chains, lengths = chains_of(self._model, frames)
         limits = np.array([robot.joint_lower, robot.joint_upper, robot.joint_speed, robot.torque_limit])
         self._constants = (chains, lengths, limits, np.array([robot.damping, robot.frictionloss]), robot.mass)
         self._com_integral, self._hand_integral = np.zeros(3), np.zeros((2, 3))
@@ -100,16 +100,3 @@ class FusedAssembly:
     def forget(self) -> None:
         """Clear the integrals, see `TaskStack.forget`."""
         self._com_integral[:], self._hand_integral[:] = 0.0, 0.0
-
-
-def _chains(model: pin.Model, frames: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Velocity coordinates that move each frame, from the base out, padded (frames, longest), and how many."""
-    chains = []
-    for frame in frames:
-        joints = list(model.supports[model.frames[frame].parentJoint])[1:]  # without the universe
-        chains.append([model.idx_vs[j] + i for j in joints for i in range(model.nvs[j])])
-    lengths = np.array([len(chain) for chain in chains])
-    padded = np.zeros((len(frames), int(lengths.max())), dtype=np.int64)
-    for row, chain in zip(padded, chains, strict=True):
-        row[: len(chain)] = chain
-    return padded, lengths

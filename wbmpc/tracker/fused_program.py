@@ -10,9 +10,10 @@ from math import inf, sqrt, tanh
 
 import numpy as np
 
+from wbmpc.frame_terms import frame_terms
 from wbmpc.jit import kernel
 from wbmpc.tracker.fused_contacts import clearance_rows, contact_terms
-from wbmpc.tracker.fused_tasks import body_tasks, frame_terms, hand_task
+from wbmpc.tracker.fused_tasks import body_tasks, hand_task
 
 CLEARANCE_FIRST, TORQUE_FIRST = 36, 50  # rows, see program.py
 LARGE = 2000.0  # [rad/s²] see JointLimits

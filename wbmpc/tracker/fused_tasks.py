@@ -12,48 +12,10 @@ import numpy as np
 
 from wbmpc.jit import kernel
 
-SOLE, PALM, ELBOW, TORSO, FRAMES = 0, 2, 4, 6, 7  # first row of each kind in the frames' arrays, and their number
+SOLE, PALM, ELBOW, TORSO = 0, 2, 4, 6  # first row of each kind in the frames' arrays
 COM_ROW, MOMENTUM_ROW, TORSO_ROW, FOOT_ROW, HAND_ROW = 0, 3, 6, 9, 21
 MOVE, CONTACT, CARRY = 1, 2, 3  # HandMode
 GRAVITY = 9.81  # [m/s²]
-
-
-@kernel
-def frame_terms(J, v, chains, lengths, positions, jacobian, twist, drift):  # type: ignore[no-untyped-def]
-    """Jacobians (7, 6, nv), twists (7, 6) and J̇v (7, 6) of the frames, at their origins in world axes.
-
-    Column k of `J` (6, nv) is the screw of coordinate k about the world's origin. It moves with the body before it:
-    its rate is that body's twist × the screw. `chains` lists the coordinates that move a frame, the base's six first.
-    """
-    jacobian[:] = 0.0
-    for f in range(FRAMES):
-        px, py, pz = positions[f][0], positions[f][1], positions[f][2]
-        ux = uy = uz = wx = wy = wz = 0.0  # twist about the world's origin
-        ax = ay = az = bx = by = bz = 0.0  # its rate at v̇ = 0
-        for c in range(lengths[f]):
-            k = chains[f, c]
-            lx, ly, lz, rx, ry, rz = J[0, k], J[1, k], J[2, k], J[3, k], J[4, k], J[5, k]
-            jacobian[f, 0, k] = lx + ry * pz - rz * py
-            jacobian[f, 1, k] = ly + rz * px - rx * pz
-            jacobian[f, 2, k] = lz + rx * py - ry * px
-            jacobian[f, 3, k], jacobian[f, 4, k], jacobian[f, 5, k] = rx, ry, rz
-            s = v[k]
-            if k >= 6:
-                ax += s * (wy * lz - wz * ly + uy * rz - uz * ry)
-                ay += s * (wz * lx - wx * lz + uz * rx - ux * rz)
-                az += s * (wx * ly - wy * lx + ux * ry - uy * rx)
-                bx += s * (wy * rz - wz * ry)
-                by += s * (wz * rx - wx * rz)
-                bz += s * (wx * ry - wy * rx)
-            ux, uy, uz = ux + s * lx, uy + s * ly, uz + s * lz
-            wx, wy, wz = wx + s * rx, wy + s * ry, wz + s * rz
-        tx, ty, tz = ux + wy * pz - wz * py, uy + wz * px - wx * pz, uz + wx * py - wy * px
-        twist[f, 0], twist[f, 1], twist[f, 2] = tx, ty, tz
-        twist[f, 3], twist[f, 4], twist[f, 5] = wx, wy, wz
-        drift[f, 0] = ax + by * pz - bz * py + wy * tz - wz * ty
-        drift[f, 1] = ay + bz * px - bx * pz + wz * tx - wx * tz
-        drift[f, 2] = az + bx * py - by * px + wx * ty - wy * tx
-        drift[f, 3], drift[f, 4], drift[f, 5] = bx, by, bz
 
 
 @kernel
