@@ -34,7 +34,8 @@ ALLOWED = {
     "frame_terms": ROBOT,
     "settings": BASE | {"settings"},  # every settings.py: what a scenario may write for the package that it stands in
     "scenario": ROBOT | SETTINGS,
-    "plant": ROBOT | SETTINGS | {"plant"},  # knows nothing of the controller
+    "contact_sums": BASE | {"contact_sums"},
+    "plant": ROBOT | SETTINGS | {"plant", "contact_sums"},  # knows nothing of the controller
     "estimator": ROBOT | SETTINGS | {"estimator", "estimator_kernel"},
     "estimator_kernel": ROBOT | {"estimator_kernel"},
     "qp": BASE | {"qp"},

@@ -6,13 +6,13 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.contact_sums import contact_sums
 from wbmpc.robot import Robot
-from wbmpc.rotations import cross
 from wbmpc.scenario import Disturbance, SensorSettings
 from wbmpc.scenario.random_streams import Stream, generator
 from wbmpc.signals import MAX_CONTACTS, SIDES, Measurement, Truth, Vector
 
-PARTS = np.arange(4)[:, None]  # left and right sole, left and right palm
+MOST_SEEN = 4 * MAX_CONTACTS  # of MuJoCo's contacts, many of which may carry no force
 
 
 class Plant:
@@ -47,13 +47,15 @@ class Plant:
         self._torso = model.body("torso").id
         geom_body = model.geom_bodyid
         self._is_robot = model.body_rootid[geom_body] == self._root
-        self._part = np.full(model.ngeom, -1)  # which of PARTS a geom is
+        self._part = np.full(model.ngeom, -1)  # 0, 1: the soles; 2, 3: the palms
         for part, name in enumerate([f"{side}_foot" for side in SIDES] + [f"{side}_palm_geom" for side in SIDES]):
             self._part[model.geom(name).id] = part
         self._sensor = {
             name: slice(int(model.sensor(name).adr[0]), int(model.sensor(name).adr[0] + model.sensor(name).dim[0]))
             for name in ("imu_quaternion", "imu_gyro", "imu_accelerometer")
         }
+        kinds = (((2,), int), ((), int), ((9,), float), ((3,), float), ((), float), ((), int))
+        self._seen = tuple(np.zeros((MOST_SEEN, *shape), dtype=kind) for shape, kind in kinds)  # see contact_sums
         self._sole_wrench = np.zeros((2, 6))
         self._palm_force = np.zeros((2, 3))
         self.data.qpos[:] = qpos
@@ -125,7 +127,7 @@ class Plant:
             sole_position=sole,
             torso_up=torso_up,
             external_force=external,
-            zmp=self._centre_of_pressure(sole),
+            zmp=contacts[5],
             contact_count=contacts[0],
             contact_geoms=contacts[1],
             contact_position=contacts[2],
@@ -149,58 +151,22 @@ class Plant:
                 total += now
         return total
 
-    def _contacts(self, sole: Vector) -> tuple[int, NDArray[np.int64], Vector, Vector, Vector]:
-        """Contacts of the step just made, forces on the robot; also the wrenches the force sensors see."""
-        d = self.data
-        contact, count = d.contact, d.ncon
-        geoms = np.full((MAX_CONTACTS, 2), -1, dtype=np.int64)
+    def _contacts(self, sole: Vector) -> tuple[int, NDArray[np.int64], Vector, Vector, Vector, Vector]:
+        """Contacts of the step just made, forces on the robot, and the ZMP; also the wrenches the force sensors see."""
+        d, contact, seen = self.data, self.data.contact, self._seen
+        geoms, zmp = np.full((MAX_CONTACTS, 2), -1, dtype=np.int64), np.empty(2)
         position, force = np.zeros((MAX_CONTACTS, 3)), np.zeros((MAX_CONTACTS, 3))
         distance = np.zeros(MAX_CONTACTS)
-        self._sole_wrench[:], self._palm_force[:] = 0.0, 0.0
-        if count == 0:
-            return 0, geoms, position, force, distance
-        pairs, address = contact.geom, contact.efc_address
-        keep = address >= 0
-        if not keep.all():
-            pairs, address = pairs[keep], address[keep]
-            frame, where, gap = contact.frame[keep], contact.pos[keep], contact.dist[keep]
-        else:
-            frame, where, gap = contact.frame, contact.pos, contact.dist
-        count = min(len(address), MAX_CONTACTS)
-        if count == 0:
-            return 0, geoms, position, force, distance
-        pairs, address, frame = pairs[:count], address[:count], frame[:count].reshape(count, 3, 3)
-        local = d.efc_force[address[:, None] + np.arange(3)]  # normal, two tangents (elliptic cone)
-        on_second = np.einsum("ci,cij->cj", local, frame)  # the normal points from the first geom to the second
-        spin = np.where(contact.dim[keep][:count] >= 4, d.efc_force[np.minimum(address + 3, d.nefc - 1)], 0.0)
-        second_is_robot = self._is_robot[pairs[:, 1]]
-        torsion = np.where(second_is_robot, spin, -spin)[:, None] * frame[:, 0]  # condim 4: moment about the normal
-        world = np.where(second_is_robot[:, None], on_second, -on_second)
-        geoms[:count], position[:count], force[:count], distance[:count] = pairs, where[:count], world, gap[:count]
-        part = np.maximum(self._part[pairs[:, 0]], self._part[pairs[:, 1]])
-        select = (part == PARTS).astype(np.float64)  # (4, count): soles, then palms
-        sums = select @ world
-        point = where[:count]
-        moment = torsion  # about the world's origin, then about the sole
-        moment[:, 0] += point[:, 1] * world[:, 2] - point[:, 2] * world[:, 1]
-        moment[:, 1] += point[:, 2] * world[:, 0] - point[:, 0] * world[:, 2]
-        moment[:, 2] += point[:, 0] * world[:, 1] - point[:, 1] * world[:, 0]
-        self._sole_wrench[:, :3] = sums[:2]
-        self._sole_wrench[:, 3:] = select[:2] @ moment
-        for side in range(2):
-            self._sole_wrench[side, 3:] -= cross(sole[side], sums[side])
-        self._palm_force[:] = sums[2:]
-        return count, geoms, position, force, distance
-
-    def _centre_of_pressure(self, sole: Vector) -> Vector:
-        """Centre of pressure (2,) of both feet [m], on the plane of the mean sole height; nan without foot force."""
-        f = self._sole_wrench[:, :3]
-        if f[:, 2].sum() < 1e-6:
-            return np.full(2, np.nan)
-        m = self._sole_wrench[:, 3:]
-        x = sole[:, 0] * f[:, 2] - m[:, 1]
-        y = sole[:, 1] * f[:, 2] + m[:, 0]
-        return np.array([x.sum(), y.sum()]) / f[:, 2].sum()
+        count = min(d.ncon, len(seen[0]))
+        if count:
+            fields = (contact.geom, contact.efc_address, contact.frame, contact.pos, contact.dist, contact.dim)
+            for cell, field in zip(seen, fields, strict=True):
+                cell[:count] = field[:count]
+        kept = contact_sums(
+            *(count, seen, d.efc_force, self._is_robot, self._part, sole),
+            *((geoms, position, force, distance), self._sole_wrench, self._palm_force, zmp),
+        )
+        return kept, geoms, position, force, distance, zmp
 
 
 def _noise_scales(sensors: SensorSettings, joints: int) -> Vector:
