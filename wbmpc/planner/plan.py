@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.plan_kernel import com_at, continue_plan
 from wbmpc.planner.whole_body import HorizontalPlan
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
@@ -51,54 +52,51 @@ class Plan:
 
     def com_state(self, time: float) -> Vector:
         """CoM state (3 axes, 3) = c, ċ, c̈ at `time` [m, m/s, m/s²]; it stays at the last knot after the horizon."""
-        elapsed = max(time - self.time, 0.0)
-        if elapsed > self.step * len(self.com_jerk) + 1e-9:
-            out = np.zeros((3, 3))
-            out[:, 0] = self.com_states[-1, :, 0]
-            return out
-        knot = min(int(elapsed / self.step + 1e-9), len(self.com_jerk) - 1)
-        t = min(elapsed - knot * self.step, self.step)
-        state, jerk = self.com_states[knot], self.com_jerk[knot]
         out = np.empty((3, 3))
-        out[:, 0] = state[:, 0] + t * state[:, 1] + t**2 / 2 * state[:, 2] + t**3 / 6 * jerk
-        out[:, 1] = state[:, 1] + t * state[:, 2] + t**2 / 2 * jerk
-        out[:, 2] = state[:, 2] + t * jerk
-        return out
+        com_at(max(time - self.time, 0.0), self.step, self.com_states, self.com_jerk, out)
+        return out.T
 
     def sample(self, time: float) -> Setpoint:
         """The setpoint at `time` ≥ the snapshot's."""
-        dt = min(max(time - self.time, 0.0), self.step)
-        going = 1.0 if time - self.time <= self.step + 1e-9 else 0.0  # a late plan's tail holds still
-        com = self.com_state(time)
-        wx, wy, wz = dt * self.torso_angular_velocity
-        turn = np.array([[1.0, -wz, wy], [wz, 1.0, -wx], [-wy, wx, 1.0]])
+        elapsed = max(time - self.time, 0.0)
+        com = np.empty((3, 3))
+        com_at(elapsed, self.step, self.com_states, self.com_jerk, com)
+        nj, foot, hand = len(self.velocity) - 6, np.empty((3, 2, 3)), np.empty((3, 2, 3))
+        joint, torso, pairs = np.empty((2, nj)), np.empty((4, 3)), np.empty((3, 2))
+        continue_plan(
+            min(elapsed, self.step),
+            1.0 if elapsed <= self.step + 1e-9 else 0.0,  # a late plan's tail holds still
+            (self.q, self.velocity),
+            (self.torso_rotation, self.torso_angular_velocity),
+            (self.foot_position, self.foot_velocity, self.foot_acceleration, self.foot_yaw, self.foot_yaw_rate),
+            (
+                *(self.hand_position, self.hand_velocity, self.hand_acceleration, self.hand_jerk),
+                *(self.hand_force_cap, self.hand_force_cap_rate, self.hand_force_cap_top),
+            ),
+            (*joint, torso[:3], torso[3], *foot, *pairs[:2], *hand, pairs[2]),
+        )
         return Setpoint(
             time=time,
-            com_position=com[:, 0],
-            com_velocity=com[:, 1],
-            com_acceleration=com[:, 2],
-            joint_position=self.q[7:] + dt * self.velocity[6:],
-            joint_velocity=going * self.velocity[6:],
-            torso_rotation=turn @ self.torso_rotation,
-            torso_angular_velocity=going * self.torso_angular_velocity,
+            com_position=com[0],
+            com_velocity=com[1],
+            com_acceleration=com[2],
+            joint_position=joint[0],
+            joint_velocity=joint[1],
+            torso_rotation=torso[:3],
+            torso_angular_velocity=torso[3],
             foot_stance=self.foot_stance,
-            foot_position=self.foot_position + dt * self.foot_velocity + dt**2 / 2 * self.foot_acceleration,
-            foot_yaw=self.foot_yaw + dt * self.foot_yaw_rate,
-            foot_yaw_rate=going * self.foot_yaw_rate,
-            foot_velocity=going * (self.foot_velocity + dt * self.foot_acceleration),
-            foot_acceleration=going * self.foot_acceleration,
+            foot_position=foot[0],
+            foot_yaw=pairs[0],
+            foot_yaw_rate=pairs[1],
+            foot_velocity=foot[1],
+            foot_acceleration=foot[2],
             hand_mode=self.hand_mode,
-            hand_position=self.hand_position
-            + dt * self.hand_velocity
-            + dt**2 / 2 * self.hand_acceleration
-            + dt**3 / 6 * self.hand_jerk,
-            hand_velocity=going * (self.hand_velocity + dt * self.hand_acceleration + dt**2 / 2 * self.hand_jerk),
-            hand_acceleration=going * (self.hand_acceleration + dt * self.hand_jerk),
+            hand_position=hand[0],
+            hand_velocity=hand[1],
+            hand_acceleration=hand[2],
             hand_urgency=self.hand_urgency,
             hand_force=self.hand_force,
-            hand_force_cap=np.minimum(
-                np.maximum(self.hand_force_cap + dt * self.hand_force_cap_rate, 0.0), self.hand_force_cap_top
-            ),
+            hand_force_cap=pairs[2],
             hand_normal=self.hand_normal,
             hand_friction=self.hand_friction,
             arm_keep_out=self.arm_keep_out,
