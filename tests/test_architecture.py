@@ -34,8 +34,8 @@ ALLOWED = {
     "frame_terms": ROBOT,
     "settings": BASE | {"settings"},  # every settings.py: what a scenario may write for the package that it stands in
     "scenario": ROBOT | SETTINGS,
-    "contact_sums": BASE | {"contact_sums"},
-    "plant": ROBOT | SETTINGS | {"plant", "contact_sums"},  # knows nothing of the controller
+    "plant_kernels": BASE | {"plant_kernels"},
+    "plant": ROBOT | SETTINGS | {"plant", "plant_kernels"},  # knows nothing of the controller
     "estimator": ROBOT | SETTINGS | {"estimator", "estimator_kernel"},
     "estimator_kernel": ROBOT | {"estimator_kernel"},
     "qp": BASE | {"qp"},

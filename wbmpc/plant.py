@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.contact_sums import contact_sums
+from wbmpc.plant_kernels import contact_sums, servo_torque
 from wbmpc.robot import Robot
 from wbmpc.scenario import Disturbance, SensorSettings
 from wbmpc.scenario.random_streams import Stream, generator
@@ -42,8 +42,7 @@ class Plant:
             (d, model.body(d.body).id, np.array(d.impulse) / d.duration, np.array(d.point)) for d in disturbances
         ]
         self._root = int(model.jnt_bodyid[0])
-        self._soles = [model.site(f"{side}_sole").id for side in SIDES]
-        self._palms = [model.site(f"{side}_palm").id for side in SIDES]
+        self._sites = np.array([model.site(f"{side}_{name}").id for name in ("sole", "palm") for side in SIDES])
         self._torso = model.body("torso").id
         geom_body = model.geom_bodyid
         self._is_robot = model.body_rootid[geom_body] == self._root
@@ -102,15 +101,14 @@ class Plant:
         """Apply `torque` (nj,) [N·m], clipped to the servo's torque-speed line, for one step; returns what happened."""
         m, d, robot = self.model, self.data, self._robot
         time, qpos, qvel = float(d.time), d.qpos.copy(), d.qvel.copy()
-        speed = qvel[6 : 6 + robot.nj] / robot.joint_speed
-        upper = robot.torque_limit * np.minimum(np.maximum(1.0 - speed, 0.0), 1.0)
-        lower = robot.torque_limit * np.maximum(np.minimum(-1.0 - speed, 0.0), -1.0)
-        applied = np.minimum(np.maximum(torque, lower), upper)
+        applied, limit = np.empty(robot.nj), np.empty(robot.nj)
+        servo_torque(torque, qvel, robot.joint_speed, robot.torque_limit, applied, limit)
         d.ctrl[:] = applied
         external = self._push(time)
         mujoco.mj_subtreeVel(m, d)
         com, com_velocity = d.subtree_com[self._root].copy(), d.subtree_linvel[self._root].copy()
-        palm, sole = d.site_xpos[self._palms], d.site_xpos[self._soles]
+        sites = d.site_xpos.take(self._sites, axis=0)
+        sole, palm = sites[:2], sites[2:]
         torso_up = float(d.xmat[self._torso, 8])
         mujoco.mj_step2(m, d)
         contacts = self._contacts(sole)
@@ -120,7 +118,7 @@ class Plant:
             qpos=qpos,
             qvel=qvel,
             torque=applied,
-            torque_limit=np.where(applied >= 0.0, upper, -lower),
+            torque_limit=limit,
             com=com,
             com_velocity=com_velocity,
             palm_position=palm,

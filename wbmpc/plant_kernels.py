@@ -1,4 +1,4 @@
-"""What MuJoCo's contacts do to the robot's soles and palms, as machine code; plant.py calls it once a tick."""
+"""The plant's servos, and what MuJoCo's contacts do to soles and palms, as machine code."""
 
 from __future__ import annotations
 
@@ -7,6 +7,21 @@ from math import nan
 import numpy as np
 
 from wbmpc.jit import kernel
+
+
+@kernel
+def servo_torque(wanted, qvel, no_load_speed, stall_torque, applied, limit):  # type: ignore[no-untyped-def]
+    """Write what the servos give of the `wanted` torques (nj,), and what they could give in that direction.
+
+    Each servo's torque falls on a straight line from stall to zero at its no-load speed. `qvel` holds the base's six
+    coordinates first.
+    """
+    for j in range(applied.size):
+        speed = qvel[6 + j] / no_load_speed[j]
+        upper = stall_torque[j] * min(max(1.0 - speed, 0.0), 1.0)
+        lower = stall_torque[j] * max(min(-1.0 - speed, 0.0), -1.0)
+        applied[j] = min(max(wanted[j], lower), upper)
+        limit[j] = upper if applied[j] >= 0.0 else -lower
 
 
 @kernel
