@@ -51,6 +51,7 @@ ALLOWED = {
     "initial": ROBOT | SETTINGS | {"initial"},
     "loop": LOOP,
     "realtime": LOOP | {"realtime"},
+    "warm_up": LOOP | {"warm_up"},
     "facts": ROBOT | SETTINGS | {"checks", "facts"},
     "metrics": RECORDS | {"checks", "metrics"},
     "versions": {"versions"},

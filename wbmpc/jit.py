@@ -19,7 +19,11 @@ def kernel(function: F) -> F:
     Arithmetic is that of the source: no reordering (`fastmath` off), 1/0 is inf as in numpy. With NUMBA_DISABLE_JIT=1
     kernels run as plain Python, for a debugger.
     """
-    compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
+    options = {"nogil": True, "error_model": "numpy"}
+    try:
+        compiled = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no folder to keep code in: every process compiles for itself
+        compiled = numba.njit(**options)(function)
     stamp = _stamp(function)
     cache = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if hasattr(cache, _STAMP):  # numba itself looks at the file of the kernel only, not at those it calls
