@@ -68,31 +68,35 @@ def write_plans(
 def _write_horizons(
     stream: Stream, plans: Sequence[PlanReport], time: NDArray[np.float64], ground: NDArray[np.float64]
 ) -> None:
-    stream.strips("/world/com/horizon", time, [[plan.com] for plan in plans])
-    zmp = [on_ground(plan.zmp, z) for plan, z in zip(plans, ground, strict=True)]
+    com = np.array([plan.com for plan in plans])  # (n, N, 3)
+    stream.strips("/world/com/horizon", time, [[line] for line in com])
+    zmp = np.empty_like(com)
+    zmp[:, :, :2], zmp[:, :, 2] = [plan.zmp for plan in plans], ground[:, None]
     stream.strips("/world/zmp/horizon", time, [[line] for line in zmp])
     polygons = [on_ground(plan.support_polygon, z) for plan, z in zip(plans, ground, strict=True)]
     stream.strips("/world/support_polygon", time, [[np.vstack([p, p[:1]])] if len(p) else [] for p in polygons])
+    references = np.array([plan.hand_reference for plan in plans])  # (n, 2, N, 3)
+    known = np.isfinite(references).all(axis=3)
     for i, side in enumerate(SIDES):
-        lines = [plan.hand_reference[i][np.isfinite(plan.hand_reference[i]).all(axis=1)] for plan in plans]
+        lines = [line[there] for line, there in zip(references[:, i], known[:, i], strict=True)]
         stream.strips(f"/world/hands/{side}/horizon", time, [[line] if len(line) else [] for line in lines])
-    shifts = [np.column_stack([plan.delta_z, np.zeros(len(plan.delta_z))]) for plan in plans]
-    drawn = [np.linalg.norm(shift, axis=1) > _LEAST_DRAWN_SHIFT for shift in shifts]
-    vectors = np.concatenate([shift[d] for shift, d in zip(shifts, drawn, strict=True)])
-    tips = np.concatenate([line[d] for line, d in zip(zmp, drawn, strict=True)])
+    shifts = np.zeros_like(com)
+    shifts[:, :, :2] = [plan.delta_z for plan in plans]
+    drawn = np.linalg.norm(shifts, axis=2) > _LEAST_DRAWN_SHIFT
+    vectors, tips = shifts[drawn], zmp[drawn]
     columns = rr.Arrows3D.columns(origins=tips - vectors, vectors=vectors)
-    stream.columns("/world/zmp/delta_z", time, columns.partition([int(d.sum()) for d in drawn]))
+    stream.columns("/world/zmp/delta_z", time, columns.partition(drawn.sum(axis=1)))
 
 
 def _write_curves(stream: Stream, plans: Sequence[PlanReport], time: NDArray[np.float64], knot_period: float) -> None:
     # The first knot is a statement about t + T: drawn there, it can be compared with what was measured then.
     first_knot = time + knot_period
     stream.scalars("/com/z/band", first_knot, [plan.com_height_band[0] for plan in plans])
+    zmp, delta_z = np.array([plan.zmp[0] for plan in plans]), np.array([plan.delta_z for plan in plans])
     for i, axis in enumerate("xy"):
-        stream.scalars(f"/zmp/{axis}/planned", first_knot, [plan.zmp[0, i] for plan in plans])
+        stream.scalars(f"/zmp/{axis}/planned", first_knot, zmp[:, i])
         stream.scalars(f"/zmp/{axis}/support", time, [_range(plan.support_polygon[:, i]) for plan in plans])
-    largest = [np.linalg.norm(plan.delta_z, axis=1).max() for plan in plans]
-    shift = np.column_stack([np.array([plan.delta_z[0] for plan in plans]), largest])
+    shift = np.column_stack([delta_z[:, 0], np.linalg.norm(delta_z, axis=2).max(axis=1)])
     stream.scalars("/planner/delta_z", time, 1e3 * shift)
     stream.scalars("/planner/progress", time, [plan.progress for plan in plans])
     stages = [[getattr(plan, stage) for stage in _STAGES] for plan in plans]

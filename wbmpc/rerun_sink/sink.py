@@ -59,7 +59,7 @@ class RerunSink:
         knot_period: float = 0.1,
         patches: Sequence[Patch] = (),
         versions: Mapping[str, str] | None = None,
-        block: float = 1.0,
+        block: float = 2.0,
     ) -> None:
         self._stride = _stride(tick_rate, rate)
         self._recorder, self._block, self._knot_period = recorder, block, knot_period

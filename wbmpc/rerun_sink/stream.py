@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 
@@ -79,8 +80,7 @@ class Stream:
 
     def strips(self, path: str, time: NDArray[np.float64], strips: list[list[NDArray[np.float64]]]) -> None:
         """Lines: strips[i] are the polylines, each (k, 3) [m], at time i."""
-        flat = [strip for row in strips for strip in row]
-        columns = rr.LineStrips3D.columns(strips=flat)
+        columns = rr.LineStrips3D.columns(strips=_arrow_strips([strip for row in strips for strip in row]))
         self.columns(path, time, columns.partition([len(row) for row in strips]))
 
     def states(self, path: str, time: NDArray[np.float64], states: Sequence[str]) -> None:
@@ -98,6 +98,15 @@ class Stream:
         self.columns(
             path, time, rr.TextLog.columns(text=[drawable(text) for text in texts], level=[level] * len(texts))
         )
+
+
+def _arrow_strips(strips: list[NDArray[np.float64]]) -> pa.Array:
+    """Polylines, each (k, 3), in the file's own memory layout: rerun would convert them one by one."""
+    kind = rr.components.LineStrip3DBatch._ARROW_DATATYPE
+    points = np.concatenate([*strips, np.empty((0, 3))]).astype(np.float32)
+    offsets = np.cumsum([0, *(len(strip) for strip in strips)]).astype(np.int32)
+    flat = pa.FixedSizeListArray.from_arrays(pa.array(points.ravel()), type=kind.value_type)
+    return pa.ListArray.from_arrays(offsets, flat, type=kind)
 
 
 def _present(positions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -62,8 +62,13 @@ def write_ticks(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], str
 def write_tracker_status(stream: Stream, recorder: Recorder, since: int) -> None:
     """Send the changes of the tracker's status over all ticks from `since` on: thinning must not hide a failure."""
     status, fallback = recorder.command_status[since:], recorder.command_fallback[since:]
-    names = [SolveStatus(s).name + (", fallback" if f else "") for s, f in zip(status, fallback, strict=True)]
-    stream.states("/solver_status/tracker", recorder.time[since:], names)
+    changed = np.ones(len(status), dtype=bool)
+    changed[1:] = (status[1:] != status[:-1]) | (fallback[1:] != fallback[:-1])
+    names = [
+        SolveStatus(s).name + (", fallback" if f else "")
+        for s, f in zip(status[changed], fallback[changed], strict=True)
+    ]
+    stream.states("/solver_status/tracker", recorder.time[since:][changed], names)
 
 
 def _write_balance(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]) -> None:
