@@ -53,6 +53,7 @@ $(STAMP): requirements/dev.txt pyproject.toml
 	@test -x $(BIN)/uv || $(BIN)/python -m pip install --quiet --disable-pip-version-check uv
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip sync --require-hashes requirements/dev.txt
 	@VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/uv pip install --no-deps --no-build-isolation -e .
+	@$(BIN)/python -m wbmpc.warm_up
 	@touch $@
 
 UV_LOCK = $(BIN)/uv pip compile pyproject.toml --quiet $(UPGRADE) --generate-hashes --no-emit-index-url \

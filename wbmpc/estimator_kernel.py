@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 
 from wbmpc.frame_terms import frame_twists
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 VELOCITY_GAIN = 0.06  # share of the odometry's velocity per tick
 POSITION_GAIN = 0.1  # share of the odometry's position per tick
@@ -17,7 +17,7 @@ MASS_TIME = 0.8  # [s] time constant of the mass estimate
 GRAVITY = 9.81  # [m/s²]
 
 
-@kernel
+@short_kernel
 def rotation_of(quaternion, R):  # type: ignore[no-untyped-def]
     """Write the rotation (3, 3) of a quaternion wxyz, which need not have unit length."""
     w, x, y, z = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
@@ -27,7 +27,7 @@ def rotation_of(quaternion, R):  # type: ignore[no-untyped-def]
     R[2, 0], R[2, 1], R[2, 2] = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
 
 
-@kernel
+@short_kernel
 def quaternion_of(R, out):  # type: ignore[no-untyped-def]
     """Write the unit quaternion xyzw of a rotation (3, 3), by its largest component."""
     trace = R[0, 0] + R[1, 1] + R[2, 2]
@@ -49,14 +49,14 @@ def quaternion_of(R, out):  # type: ignore[no-untyped-def]
     out[j], out[k] = (R[j, i] + R[i, j]) * t, (R[k, i] + R[i, k]) * t
 
 
-@kernel
+@short_kernel
 def turned(R, a, out):  # type: ignore[no-untyped-def]
     """Write R a."""
     for i in range(3):
         out[i] = R[i, 0] * a[0] + R[i, 1] * a[1] + R[i, 2] * a[2]
 
 
-@kernel
+@short_kernel
 def add_cross(a, b, scale, out):  # type: ignore[no-untyped-def]
     """Add scale · a × b to `out`."""
     out[0] += scale * (a[1] * b[2] - a[2] * b[1])
@@ -64,7 +64,7 @@ def add_cross(a, b, scale, out):  # type: ignore[no-untyped-def]
     out[2] += scale * (a[0] * b[1] - a[1] * b[0])
 
 
-@kernel
+@short_kernel
 def advance(seen, frames, memory, twist, mass, step, q, v):  # type: ignore[no-untyped-def]
     """Write q (nq,), v (nv,) and move the memory one tick on; returns the mass's scale.
 

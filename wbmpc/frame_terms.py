@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 
 def chains_of(model: pin.Model, frames: tuple[int, ...]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -22,7 +22,7 @@ def chains_of(model: pin.Model, frames: tuple[int, ...]) -> tuple[NDArray[np.int
     return padded, lengths
 
 
-@kernel
+@short_kernel
 def frame_twists(J, v, chains, lengths, positions, twist):  # type: ignore[no-untyped-def]
     """Write the twists (frames, 6) at the frames' origins in world axes; see `frame_terms`."""
     for f in range(lengths.size):
@@ -37,7 +37,7 @@ def frame_twists(J, v, chains, lengths, positions, twist):  # type: ignore[no-un
         twist[f, 3], twist[f, 4], twist[f, 5] = wx, wy, wz
 
 
-@kernel
+@short_kernel
 def frame_terms(J, v, chains, lengths, positions, jacobian, twist, drift):  # type: ignore[no-untyped-def]
     """Write Jacobians (f, 6, nv), twists (f, 6) and J̇v (f, 6) of f frames, at their origins in world axes.
 

@@ -1,4 +1,4 @@
-"""How hot loops are compiled: one decorator, machine code cached beside the source."""
+"""How hot loops are compiled: two decorators, machine code cached beside the source."""
 
 from __future__ import annotations
 
@@ -14,14 +14,26 @@ _STAMP = "_source_stamp"
 
 
 def kernel(function: F) -> F:
-    """Compile `function` at its first call, without the interpreter's lock, and keep the code for the next process.
+    """Compile `function` at its first call and keep the code for the next process; it gives up the interpreter's lock.
 
-    Arithmetic is that of the source: no reordering (`fastmath` off), 1/0 is inf as in numpy. With NUMBA_DISABLE_JIT=1
-    kernels run as plain Python, for a debugger.
+    For the planner's thread: the ticks go on while it runs. Arithmetic is that of the source: no reordering (`fastmath`
+    off), 1/0 is inf as in numpy. With NUMBA_DISABLE_JIT=1 kernels run as plain Python, for a debugger.
     """
-    options = {"nogil": True, "error_model": "numpy"}
+    return _compiled(function, nogil=True)
+
+
+def short_kernel(function: F) -> F:
+    """The same for the tick's thread, keeping the lock: to get it back from a busy planner takes longer than the work.
+
+    Also for kernels that only other kernels call.
+    """
+    return _compiled(function, nogil=False)
+
+
+def _compiled(function: F, *, nogil: bool) -> F:
+    options = {"nogil": nogil, "error_model": "numpy"}
     try:
-        compiled = numba.njit(cache=True, **options)(function)
+        compiled: F = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder to keep code in: every process compiles for itself
         compiled = numba.njit(**options)(function)
     stamp = _stamp(function)
@@ -30,8 +42,7 @@ def kernel(function: F) -> F:
         setattr(cache, _STAMP, stamp)
     if not numba.config.DISABLE_JIT:
         setattr(compiled, _STAMP, stamp)
-    answer: F = compiled
-    return answer
+    return compiled
 
 
 def _stamp(function: Callable[..., Any]) -> tuple[Any, ...]:

@@ -6,10 +6,10 @@ from math import nan
 
 import numpy as np
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 
-@kernel
+@short_kernel
 def servo_torque(wanted, qvel, no_load_speed, stall_torque, applied, limit):  # type: ignore[no-untyped-def]
     """Write what the servos give of the `wanted` torques (nj,), and what they could give in that direction.
 
@@ -24,7 +24,7 @@ def servo_torque(wanted, qvel, no_load_speed, stall_torque, applied, limit):  # 
         limit[j] = upper if applied[j] >= 0.0 else -lower
 
 
-@kernel
+@short_kernel
 def contact_sums(count, seen, efc_force, is_robot, part, sole, truth, sole_wrench, palm_force, zmp):  # type: ignore[no-untyped-def]
     """Write the contacts that carry force, forces on the robot, and their sums; returns how many there are.
 

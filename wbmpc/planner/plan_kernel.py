@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 
-@kernel
+@short_kernel
 def com_at(elapsed, step, states, jerk, out):  # type: ignore[no-untyped-def]
     """Write c, ċ, c̈, rows of out (3, 3), `elapsed` [s] after the snapshot: constant jerks, standstill after them."""
     knots = jerk.shape[0]
@@ -22,7 +22,7 @@ def com_at(elapsed, step, states, jerk, out):  # type: ignore[no-untyped-def]
         out[2, i] = a + t * j
 
 
-@kernel
+@short_kernel
 def continue_plan(dt, going, joints, torso, feet, hands, out):  # type: ignore[no-untyped-def]
     """Continue joints, torso, feet and hands for `dt` [s]; velocities are those × `going`, 0 for a plan too late."""
     q, velocity = joints

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import inf, isfinite, isnan
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 SOUND, NOT_FINITE, CROSSING = 0, 1, 2
 
 
-@kernel
+@short_kernel
 def finite(data):  # type: ignore[no-untyped-def]
     """Whether a flat array holds neither nan nor inf: 0 · x is 0 for finite x only. Four sums, to keep the CPU busy."""
     a = b = c = d = 0.0
@@ -24,7 +24,7 @@ def finite(data):  # type: ignore[no-untyped-def]
     return a + b + c + d == 0.0
 
 
-@kernel
+@short_kernel
 def soundness(hessian, gradient, matrix, lower, upper, matrices_changed):  # type: ignore[no-untyped-def]
     """SOUND, NOT_FINITE for nan or inf where no solver takes them, CROSSING for bounds that nothing can keep.
 
@@ -41,7 +41,7 @@ def soundness(hessian, gradient, matrix, lower, upper, matrices_changed):  # typ
     return CROSSING if crossing else SOUND
 
 
-@kernel
+@short_kernel
 def closes_duality_gap(x, cost, multiplier, gradient, lower, upper, tolerance):  # type: ignore[no-untyped-def]
     """Whether |2 f(x) − gᵀx + λᵀb| is small, b the bound on the side of λ's sign; `x` must be finite."""
     dual = linear = 0.0

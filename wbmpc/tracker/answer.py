@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 
-@kernel
+@short_kernel
 def joint_torque(y, matrix, offset, lower, upper, tolerance, torque):  # type: ignore[no-untyped-def]
     """Write the torques of y, not yet clipped; returns whether one of them is at its bound or beyond."""
     bound = False
@@ -18,7 +18,7 @@ def joint_torque(y, matrix, offset, lower, upper, tolerance, torque):  # type: i
     return bound
 
 
-@kernel
+@short_kernel
 def motion_and_wrenches(y, base_map, base_offset, rotation, acceleration, wrench, palm):  # type: ignore[no-untyped-def]
     """Write v̇ (nv,), sole wrenches (2, 6) and palm forces (2, 3) in world."""
     nj = acceleration.size - 6

@@ -10,7 +10,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 from wbmpc.tracker.fused_tasks import CARRY, CONTACT, ELBOW, PALM, SOLE, TORSO
 
 PALM_FIRST, PALM_ROWS = 20, 4  # see program.py
@@ -18,7 +18,7 @@ POINTS, ARM_ROWS, NEAR = 3, 7, 0.10  # see Clearance
 SENSED_SHARE = 0.2  # see plain.py
 
 
-@kernel
+@short_kernel
 def contact_axes(normal, R):  # type: ignore[no-untyped-def]
     """See `rotations.contact_frame`; written to `R` (3, 3)."""
     nx, ny, nz = normal[0], normal[1], normal[2]
@@ -31,7 +31,7 @@ def contact_axes(normal, R):  # type: ignore[no-untyped-def]
     R[0, 2], R[1, 2], R[2, 2] = nx, ny, nz
 
 
-@kernel
+@short_kernel
 def contact_terms(s, g, nj, soles_R, jacobian, palm_force, sensed, qp, terms):  # type: ignore[no-untyped-def]
     """Jacobians, bounds, cones, prices and references of the contact forces: see `PlainAssembly`."""
     rows, x_lower, x_upper = qp[2], qp[5], qp[6]
@@ -95,7 +95,7 @@ def contact_terms(s, g, nj, soles_R, jacobian, palm_force, sensed, qp, terms):  
             rows[row + i, y + 2] = -mu
 
 
-@kernel
+@short_kernel
 def arm_row(frames, side, share, d, out):  # type: ignore[no-untyped-def]
     """Write the row (nv,) of a point between palm (0) and elbow (1) along d (3,); returns its J̇v and speed."""
     _, jacobian, twist, drift = frames
@@ -111,7 +111,7 @@ def arm_row(frames, side, share, d, out):  # type: ignore[no-untyped-def]
     return rate, speed
 
 
-@kernel
+@short_kernel
 def clearance_rows(s, g, torso_R, frames, matrix, lower):  # type: ignore[no-untyped-def]
     """Rows C (14, nv) and bounds of C v̇ ≥ c: see Clearance."""
     positions, jacobian, twist, drift = frames

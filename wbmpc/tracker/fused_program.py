@@ -11,7 +11,7 @@ from math import inf, sqrt, tanh
 import numpy as np
 
 from wbmpc.frame_terms import frame_terms
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 from wbmpc.tracker.fused_contacts import clearance_rows, contact_terms
 from wbmpc.tracker.fused_tasks import body_tasks, hand_task
 
@@ -20,7 +20,7 @@ LARGE = 2000.0  # [rad/s²] see JointLimits
 FRICTION_SPEED = 0.1  # [rad/s] see plain.py
 
 
-@kernel
+@short_kernel
 def limit_bounds(q, v, limits, g, x_lower, x_upper, torque_lower, torque_upper):  # type: ignore[no-untyped-def]
     """Bounds on q̈ and τ: see JointLimits. `limits` (4, nj): lowest and highest angle, no-load speed, stall torque."""
     h = g.limit_horizon
@@ -38,7 +38,7 @@ def limit_bounds(q, v, limits, g, x_lower, x_upper, torque_lower, torque_upper):
         torque_lower[j] = stall * max(min(-1.0 - share, 0.0), -1.0)
 
 
-@kernel
+@short_kernel
 def solve_base(M, nle, scale, contact, base_map, base_offset):  # type: ignore[no-untyped-def]
     """v̇_base = base_map y + base_offset from the base rows, by a Cholesky factor of M_bb."""
     n, nj = base_map.shape[1], M.shape[0] - 6
@@ -73,7 +73,7 @@ def solve_base(M, nle, scale, contact, base_map, base_offset):  # type: ignore[n
             base_map[i, k] /= L[i, i]
 
 
-@kernel
+@short_kernel
 def reduce_row(row, base_map, out):  # type: ignore[no-untyped-def]
     """A row (nv,) of v̇ as a row (n,) of y: joints as they are, the base through its map."""
     nj = row.size - 6
@@ -85,7 +85,7 @@ def reduce_row(row, base_map, out):  # type: ignore[no-untyped-def]
             out[k] += row[i] * base_map[i, k]
 
 
-@kernel
+@short_kernel
 def build(s_record, g_record, step, state, pin, model, scratch, qp, answer):  # type: ignore[no-untyped-def]
     """Write the program of one tick; see FusedAssembly for what the tuples hold."""
     s, g = s_record[0], g_record[0]

@@ -10,7 +10,7 @@ from math import atan2, cos, pi, sin, sqrt
 
 import numpy as np
 
-from wbmpc.jit import kernel
+from wbmpc.jit import short_kernel
 
 SOLE, PALM, ELBOW, TORSO = 0, 2, 4, 6  # first row of each kind in the frames' arrays
 COM_ROW, MOMENTUM_ROW, TORSO_ROW, FOOT_ROW, HAND_ROW = 0, 3, 6, 9, 21
@@ -18,7 +18,7 @@ MOVE, CONTACT, CARRY = 1, 2, 3  # HandMode
 GRAVITY = 9.81  # [m/s²]
 
 
-@kernel
+@short_kernel
 def add_rotation_error(desired, measured, gain, out):  # type: ignore[no-untyped-def]
     """Add `gain` times `rotation_error` of two (3, 3) rotations to `out` (3,)."""
     r = np.empty((3, 3))
@@ -43,7 +43,7 @@ def add_rotation_error(desired, measured, gain, out):  # type: ignore[no-untyped
     out[2] += gain * scale * z
 
 
-@kernel
+@short_kernel
 def body_tasks(s, g, step, pin, frames, matrix, target, weight, com_integral):  # type: ignore[no-untyped-def]
     """CoM, angular momentum, torso and feet: see TaskStack."""
     com, vcom, Jcom, Ag, nle, base_R, base_p, mass, soles_R, torso_R, v = pin
@@ -103,7 +103,7 @@ def body_tasks(s, g, step, pin, frames, matrix, target, weight, com_integral):  
             add_rotation_error(level, soles_R[side], g.swing_stiffness, target[first + 3 : first + 6])
 
 
-@kernel
+@short_kernel
 def hand_task(s, g, step, side, frames, matrix, target, weight, integral):  # type: ignore[no-untyped-def]
     """One palm: see TaskStack. `integral` (3,) is its own."""
     positions, jacobian, twist, drift = frames
