@@ -13,13 +13,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from short_run import ROBOT, finished, new_recorder, new_session, stand
+from short_run import ROBOT, finished, new_recorder, stand
 
 from wbmpc import realtime
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.realtime import PlannerThread, run_realtime
 from wbmpc.signals import RobotState
+from wbmpc.timing import Schedule
 
 STAND = stand()
 
@@ -50,19 +51,12 @@ def test_replay_in_lockstep_repeats_the_bits() -> None:
     """What makes a threaded run unrepeatable is when its plans are ready: charge that, and nothing else is left."""
     scenario = stand(duration=0.3, sensors__noise_scale=1.0, seed=5)
     timing, recorder = finished(scenario, run=run_realtime)
-    ready = {
-        round(1e3 * plan.time): latency for plan, latency in zip(recorder.plans[1:], timing.plan_latency, strict=True)
-    }
-    assert ready
-
-    session, replayed = new_session(scenario)
-
-    def plan(state: RobotState) -> None:
-        session.mailbox.post(session.planner.solve(state), available_at=state.time + ready[round(1e3 * state.time)])
-
-    for tick in range(session.ticks):
-        session.tick(plan if tick in ready else None)
+    assert timing.effects
+    assert all(effect > snapshot for snapshot, effect in zip(timing.snapshots, timing.effects, strict=True))
+    schedule = Schedule(dict(zip(timing.snapshots, timing.effects, strict=True)), recorder.ticks)
+    again, replayed = finished(scenario, schedule=schedule)
     assert replayed.state_sha256 == recorder.state_sha256
+    assert (again.snapshots, again.effects) == (timing.snapshots, timing.effects)
 
 
 def test_an_error_of_the_planner_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,8 +72,9 @@ def test_an_error_of_the_planner_surfaces(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(Planner, "solve", failing)
     threads, interval = active_count(), sys.getswitchinterval()
     recorder = new_recorder(scenario := stand(duration=2.0))
-    with pytest.raises(ZeroDivisionError, match="the third plan"):
+    with pytest.raises(RuntimeError, match=r"snapshot of 0.0\d0 s: ZeroDivisionError: the third plan") as raised:
         run_realtime(scenario, robot=ROBOT, recorder=recorder)
+    assert isinstance(raised.value.__cause__, ZeroDivisionError)
     assert recorder.ticks < 1000  # at once, not at the end
     assert active_count() == threads
     assert gc.isenabled()
@@ -124,7 +119,7 @@ def run_with_tick_times(durations: list[float]) -> tuple[Any, list[float]]:
         patch.setattr(realtime, "_warm_up", lambda *args: None)
         patch.setattr(realtime, "perf_counter", clock.perf_counter)
         patch.setattr(realtime, "sleep", clock.sleep)
-        timing = run_realtime(STAND, robot=ROBOT, recorder=None, model=object())  # type: ignore[arg-type]
+        timing = run_realtime(STAND, robot=ROBOT, recorder=new_recorder(STAND), model=object())  # type: ignore[arg-type]
     return timing, begins
 
 
@@ -141,6 +136,9 @@ def test_ticks_begin_at_their_slot_or_as_soon_as_the_last_one_ends(durations: li
     late = np.array(expected) - 1e-3 * np.arange(len(durations))
     assert np.sum(late > 1e-3 + 1e-9) <= timing.missed_deadlines <= np.sum(late > 1e-3 - margin)
     assert timing.wall_time == pytest.approx(free, abs=margin)
+    np.testing.assert_allclose(timing.tick_late, late, atol=margin)
+    np.testing.assert_allclose(timing.tick_time, durations, atol=margin)
+    assert timing.summary()["tick_late_max"] == timing.tick_late.max()
 
 
 class GatedPlanner:
