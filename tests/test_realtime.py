@@ -6,6 +6,7 @@ import gc
 import sys
 from collections.abc import Callable
 from threading import Event, Semaphore, active_count
+from time import perf_counter, sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,7 +21,7 @@ from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.realtime import PlannerThread, run_realtime
 from wbmpc.signals import RobotState
-from wbmpc.timing import Schedule
+from wbmpc.timing import LoopTiming, Schedule
 
 STAND = stand()
 
@@ -119,7 +120,8 @@ def run_with_tick_times(durations: list[float]) -> tuple[Any, list[float]]:
         patch.setattr(realtime, "_warm_up", lambda *args: None)
         patch.setattr(realtime, "perf_counter", clock.perf_counter)
         patch.setattr(realtime, "sleep", clock.sleep)
-        timing = run_realtime(STAND, robot=ROBOT, recorder=new_recorder(STAND), model=object())  # type: ignore[arg-type]
+        recorder: Any = SimpleNamespace(timing=LoopTiming(expected_ticks=8))
+        timing = run_realtime(STAND, robot=ROBOT, recorder=recorder, model=object())  # type: ignore[arg-type]
     return timing, begins
 
 
@@ -172,19 +174,26 @@ def test_the_planner_takes_the_newest_snapshot_and_leaves_out_older_ones() -> No
 
 
 def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The planner waits, so that the machine has nothing else to do: then ticks go on and plans come late."""
-    solve, sleep = Planner.solve, realtime.sleep
+    """However fast the machine, each plan waits for 35 ticks: they go on, on the tail of the plan before."""
+    solve, recorder = Planner.solve, new_recorder(scenario := stand(duration=0.4))
+    give_up = perf_counter() + 120.0
 
     def slow(planner: Planner, state: RobotState) -> Any:
-        if state.time > 0.0:
-            sleep(0.035)
+        while state.time > 0.0 and recorder.ticks < min(round(1e3 * state.time) + 35, 400):
+            assert perf_counter() < give_up
+            sleep(1e-3)
         return solve(planner, state)
 
     monkeypatch.setattr(Planner, "solve", slow)
-    timing, recorder = finished(stand(duration=0.4), run=run_realtime)
-    assert recorder.ticks == 400
-    assert timing.skipped_plans >= 1
-    assert timing.late_plans >= 1
+    timing = run_realtime(scenario, robot=ROBOT, recorder=recorder)
+    assert recorder.ticks == timing.ticks == 400
+    assert recorder.torso_up.min() > 0.99
+    assert timing.plan_latency.min() > 0.0345
+    assert timing.late_plans == len(timing.effects) == len(recorder.plans) - 1 >= 1
+    assert timing.skipped_plans >= 2 * (timing.late_plans - 1)  # between two that are planned, 35 ticks or more apart
+    summary = timing.summary()
+    assert summary["late_plans"] == summary["plans"]
+    assert summary["plan_latency_max"] >= summary["plan_latency_p50"] > 0.0345
 
 
 def test_mailbox_gives_each_plan_once_and_never_early() -> None:

@@ -11,6 +11,7 @@ from contextlib import closing
 from dataclasses import asdict
 from typing import Any
 
+from wbmpc.checks.settings import UniversalSettings
 from wbmpc.errors import WbmpcError
 from wbmpc.pool import Died, finished
 from wbmpc.scenario import Scenario, vary
@@ -84,15 +85,20 @@ def run_delays(
 
 
 def boundary(rows: Sequence[Row]) -> tuple[float | None, float | None]:
-    """The smallest delay that fails, and the largest below it that passes [s]; None where there is none.
+    """The largest delay that passes and the smallest that fails [s], going up from the first one that passes.
 
-    Above the first failure the outcome need not be monotone. A run that broke the program says nothing.
+    What fails below the first that passes is too fresh a plan, not too old a one. Above the first failure the outcome
+    need not be monotone. A run that broke the program says nothing. None where there is no such delay.
     """
-    sound = [row for row in rows if row["error"] is None]
-    fails = min((row["delay"] for row in sound if not row["passed"]), default=None)
-    passes = max(
-        (row["delay"] for row in sound if row["passed"] and (fails is None or row["delay"] < fails)), default=None
-    )
+    passes, fails = None, None
+    for row in sorted(rows, key=lambda row: float(row["delay"])):
+        if row["error"] is not None:
+            continue
+        if row["passed"]:
+            passes = row["delay"]
+        elif passes is not None:
+            fails = row["delay"]
+            break
     return passes, fails
 
 
@@ -108,6 +114,12 @@ def margin(check: Mapping[str, Any]) -> float:
     if value is None or not threshold:
         return sign
     return sign * min(abs(value - threshold) / abs(threshold), 1.0)
+
+
+def closest(row: Row) -> Mapping[str, Any] | None:
+    """Of the scenario's own checks the one with the least margin; counts that are met exactly say nothing."""
+    own = [check for check in row["checks"] if check["name"] not in UniversalSettings.model_fields]
+    return min((check for check in own if margin(check) != 0), key=margin, default=None)
 
 
 def _between(rows: Sequence[Row], scenario: Scenario) -> int | None:

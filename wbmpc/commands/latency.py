@@ -144,10 +144,14 @@ def _print(scenario: Scenario, rows: Sequence[Row]) -> None:
         )
         table.add_row(f"{1e3 * row['delay']:g}", verdict, Text(words), Text(metric))
     console().print(table)
+    print(conclusion(scenario.name, rows), flush=True)
+
+
+def conclusion(name: str, rows: Sequence[Row]) -> str:
+    """Up to which delay the scenario passes, in words."""
     passes, fails = boundary(rows)
+    if passes is None:
+        return f"{name} passes at no delay tried"
     if fails is None:
-        print(f"{scenario.name} passes at every delay tried" if passes is not None else f"{scenario.name}: no result")
-    elif passes is None:
-        print(f"{scenario.name} fails from {1e3 * fails:g} ms, the smallest delay tried")
-    else:
-        print(f"{scenario.name} passes up to {1e3 * passes:g} ms and fails from {1e3 * fails:g} ms")
+        return f"{name} passes up to {1e3 * passes:g} ms, the largest delay tried"
+    return f"{name} passes up to {1e3 * passes:g} ms and fails from {1e3 * fails:g} ms"
