@@ -19,20 +19,27 @@ from wbmpc.cli import app
 from wbmpc.provenance import document_of, scenario_of
 from wbmpc.replay import open_run
 from wbmpc.replay import replay as run_again
+from wbmpc.rerun_sink import RerunSink
 from wbmpc.scenario import Scenario, load_scenario
 from wbmpc.session import run_scenario
 from wbmpc.timing import Schedule
 
 ROOT = Path(__file__).parents[1]
 PUSHES = [
-    {"kind": "impulse", "body": "torso", "time": 0.15, "impulse": [0.3, 0.0, 0.0]},
-    {"kind": "impulse", "body": "torso", "time": 0.3, "impulse": [0.0, 0.2, 0.0]},
+    {"kind": "impulse", "body": "torso", "time": 0.05, "duration": 0.05, "impulse": [0.3, 0.0, 0.0]},
+    {"kind": "impulse", "body": "torso", "time": 0.15, "duration": 0.05, "impulse": [0.0, 0.2, 0.0]},
 ]
 
 
-def pushed(duration: float = 0.6) -> Scenario:
+def pushed(duration: float = 0.5) -> Scenario:
     """A short `stand` with pushes and sensor noise."""
-    changes = {"duration": duration, "planner.horizon_steps": 5, "sensors.noise_scale": 1.0, "disturbances": PUSHES}
+    changes = {
+        "duration": duration,
+        "planner.horizon_steps": 2,
+        "sensors.noise_scale": 1.0,
+        "disturbances": PUSHES,
+        "checks": [{"kind": "torque_peak", "max": 1.0}],
+    }
     return load_scenario(ROOT / "scenarios" / "stand.yaml", changes, seed=7)
 
 
@@ -61,7 +68,7 @@ def test_a_threaded_run_repeats_in_lockstep(call: Any, threaded: tuple[Path, str
     assert result.exit_code == 0, result.output
     recorded, replayed, verdict = result.stdout.splitlines()
     assert recorded.split()[:2] == ["recorded", sha]
-    assert "threaded, 600 ticks" in recorded
+    assert "threaded, 500 ticks" in recorded
     assert replayed.split() == ["replayed", sha]
     assert verdict == "same"
 
@@ -73,7 +80,7 @@ def test_another_latency_of_one_plan_makes_another_motion(threaded: tuple[Path, 
     # A plan that was in effect for a while; whatever the machine's speed, there is one.
     used = sorted(effects.items(), key=lambda pair: pair[1])
     snapshot, effect = next(a for a, b in pairwise(used[2:]) if b[1] > a[1] + later)
-    changed = replace(recorded.run, schedule=Schedule(effects | {snapshot: effect + later}, 600))
+    changed = replace(recorded.run, schedule=Schedule(effects | {snapshot: effect + later}, 500))
     again = run_again(replace(recorded, run=changed))
     assert again.state_sha256 != threaded[1]
     assert again.first_difference == effect + 1  # the torques of one tick move the state of the next
@@ -84,7 +91,7 @@ def test_the_command_says_where_a_run_parts(
 ) -> None:
     def shortened(path: Path, *, robot: Path | None) -> Any:
         recorded = open_run(path, robot=robot)
-        return replace(recorded, run=replace(recorded.run, schedule=Schedule({}, 600)), same_source=False)
+        return replace(recorded, run=replace(recorded.run, schedule=Schedule({}, 500)), same_source=False)
 
     monkeypatch.setattr("wbmpc.commands.replay.open_run", shortened)
     result = call(threaded[0])
@@ -100,21 +107,25 @@ def test_a_threaded_run_that_was_killed_has_nothing_to_replay(call: Any, threade
     assert len(result.stderr.splitlines()) == 1
 
 
-def test_a_lockstep_run_that_was_killed_is_replayed_as_far_as_it_was_written(call: Any, tmp_path: Path) -> None:
+def test_a_lockstep_run_that_was_killed_is_replayed_as_far_as_it_was_written(
+    call: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("wbmpc.loop.FLUSH_TICKS", 100)
+    monkeypatch.setitem(RerunSink.__init__.__kwdefaults__, "block", 0.1)
     path, killed = tmp_path / "whole.rrd", tmp_path / "killed.rrd"
 
     def copy(time: float) -> None:
-        if time == pytest.approx(1.0):
+        if time == pytest.approx(0.2):
             shutil.copy(path, killed)
 
-    sha = run_scenario(pushed(1.1), name="whole", recording=path, on_progress=copy).verdict.state_sha256
+    sha = run_scenario(pushed(0.26), name="whole", recording=path, on_progress=copy).verdict.state_sha256
     whole, part = call(path), call(killed)
     assert whole.exit_code == 0, whole.output
     assert f"replayed  {sha}" in whole.stdout
     assert part.exit_code == 0, part.output
-    assert "lockstep, 1000 ticks, 99 plans" in part.stdout
+    assert "lockstep, 200 ticks, 19 plans" in part.stdout
     assert part.stdout.splitlines()[-1] == "same"
-    assert "ends at 1 of 1.1 s" in part.stderr
+    assert "ends at 0.2 of 0.26 s" in part.stderr
 
 
 def test_the_run_may_end_before_the_recording(threaded: tuple[Path, str]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,7 +96,7 @@ def document_of(scenario: Scenario, rows: Sequence[Row], overrides: Mapping[str,
 
 def _ticks(scenario: Scenario, milliseconds: float) -> int:
     ticks = milliseconds * 1e-3 * scenario.loop.physics_rate
-    if abs(ticks - round(ticks)) > 1e-6:
+    if not math.isfinite(ticks) or abs(ticks - round(ticks)) > 1e-6:
         raise WbmpcError(
             f"--delay {milliseconds:g}: not a multiple of the timestep, {1e3 * scenario.loop.timestep:g} ms"
         )
