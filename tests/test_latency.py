@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 from wbmpc.checks.result import CheckResult
 from wbmpc.cli import app
 from wbmpc.errors import ScenarioError
-from wbmpc.latency import at_delay, boundary, closest, first_failed, margin, run_delays
+from wbmpc.latency import at_delay, boundary, first_failed, key_check, margin, run_delays
 from wbmpc.scenario import load_scenario
 
 STAND = Path(__file__).parents[1] / "scenarios" / "stand.yaml"
@@ -106,9 +106,12 @@ def test_words_about_checks() -> None:
     assert [margin(c) for c in checks] == pytest.approx([-0.6, -1.0, -2 / 3, 0.0, 0.2])
     assert margin(check("lost", False, None, 1.0)) == -1.0
     assert margin(check("none", True, 0.0, 0.0)) == 1.0
-    near = closest(row(0.0, checks=checks[3:]))
-    assert near is not None
-    assert near["name"] == "brace"
+
+
+def test_the_key_check_measures_something() -> None:
+    count, metres = check("steps", True, 3.0, 3.0) | {"unit": "1"}, check("reach", True, 0.0, 0.1)
+    assert key_check(row(0.0, checks=[check("completed", True, 2.0, 2.0), count, metres])) == "reach"
+    assert key_check(row(0.0, checks=[count])) == "steps"
 
 
 @pytest.fixture
@@ -141,8 +144,9 @@ def test_the_command_prints_and_writes(call: Any, tmp_path: Path) -> None:
     result = call("--seed", 3, "--set", "plant.mass_scale=1.1")
     assert result.exit_code == 0, result.output
     lines = [line.split() for line in result.stdout.splitlines()]
-    assert ["40", "pass", "upright_at_end", "0.99", "against", "0.95"] in lines
-    assert any(line[:7] == ["50", "FAIL", "no_fall", "0.75", "against", "0.775,", "1.50"] for line in lines)
+    assert ["delay", "[ms]", "verdict", "upright_at_end", "first", "failed", "check"] in lines
+    assert ["40", "pass", "0.99"] in lines
+    assert ["50", "FAIL", "0.99", "no_fall", "0.75", "against", "0.775,", "1.50", "s"] in lines
     assert "stand passes up to 40 ms and fails from 50 ms" in result.stdout
     document = json.loads((tmp_path / "stand_latency.json").read_text())
     assert (document["passes_up_to"], document["fails_from"], document["planner_period"]) == (0.04, 0.05, 0.01)

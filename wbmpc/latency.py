@@ -116,10 +116,11 @@ def margin(check: Mapping[str, Any]) -> float:
     return sign * min(abs(value - threshold) / abs(threshold), 1.0)
 
 
-def closest(row: Row) -> Mapping[str, Any] | None:
-    """Of the scenario's own checks the one with the least margin; counts that are met exactly say nothing."""
+def key_check(row: Row) -> str:
+    """Name of the check to follow over the delays: the scenario's first one that is neither a count nor a ratio."""
     own = [check for check in row["checks"] if check["name"] not in UniversalSettings.model_fields]
-    return min((check for check in own if margin(check) != 0), key=margin, default=None)
+    name: str = next((check for check in own if check["unit"] != "1"), own[0])["name"]
+    return name
 
 
 def _between(rows: Sequence[Row], scenario: Scenario) -> int | None:

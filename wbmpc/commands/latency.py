@@ -21,7 +21,7 @@ from wbmpc.commands.tables import console, number
 from wbmpc.errors import WbmpcError
 from wbmpc.figures.figure import FORMATS, save_figure
 from wbmpc.figures.latency import latency_figure
-from wbmpc.latency import Row, at_delay, boundary, first_failed, margin, run_delays
+from wbmpc.latency import Row, at_delay, boundary, first_failed, key_check, margin, run_delays
 from wbmpc.pool import available_cores
 from wbmpc.scenario import Scenario, load_scenario
 from wbmpc.verdict import write_json
@@ -123,11 +123,12 @@ def _value(check: Mapping[str, Any], key: str = "value") -> str:
 
 
 def _print(scenario: Scenario, rows: Sequence[Row]) -> None:
+    key = next((key_check(row) for row in rows if row["error"] is None), "")
     table = Table(title=f"{scenario.name}: plan delay", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column(Text("delay [ms]"), justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
+    table.add_column(Text(key), no_wrap=True)
     table.add_column("first failed check", overflow="fold")
-    table.add_column("closest of the scenario's checks", overflow="fold")
     for row in rows:
         failed = first_failed(row)
         if row["error"]:
@@ -138,12 +139,8 @@ def _print(scenario: Scenario, rows: Sequence[Row]) -> None:
             when = "" if failed["first_violation"] is None else f", {failed['first_violation']:.2f} s"
             words = f"{failed['name']} {_value(failed)} against {_value(failed, 'threshold')}{when}"
             verdict = Text("FAIL", style="bold red")
-        own = [check for check in row["checks"] if check["name"] not in UniversalSettings.model_fields]
-        closest = min(own, key=margin, default=None)
-        metric = (
-            "" if closest is None else f"{closest['name']} {_value(closest)} against {_value(closest, 'threshold')}"
-        )
-        table.add_row(f"{1e3 * row['delay']:g}", verdict, Text(words), Text(metric))
+        value = next((_value(check) for check in row["checks"] if check["name"] == key), "")
+        table.add_row(f"{1e3 * row['delay']:g}", verdict, Text(value), Text(words))
     console().print(table)
     print(conclusion(scenario.name, rows), flush=True)
 
