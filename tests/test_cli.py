@@ -164,6 +164,7 @@ def test_counterfactuals_pass_when_they_end_as_declared(
         "runs: 3/3 PASS calm.same: passes, as declared",
     ]
     rows = [" ".join(line.split()) for line in result.output.splitlines()]
+    assert any(row.endswith("failing checks simulated [s] wall [s]") for row in rows)
     assert "calm pass PASS upright_at_end 0.5 m, torque_peak 0.5 m 2.0 0.1" in rows
     assert "weak fail: torque_peak PASS fails torque_peak 2 m 2.0 0.1" in rows
     assert rows[-1] == "PASS: all 3 runs ended as declared"

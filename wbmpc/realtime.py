@@ -35,7 +35,7 @@ def run_realtime(
     on_progress: Callable[[float], None] | None = None,
     ended: Callable[[], str | None] | None = None,
 ) -> LoopTiming:
-    """Run a scenario against the wall clock; `run_lockstep` has the same arguments and makes the same ticks.
+    """Run a scenario against the wall clock; `run_lockstep` has these arguments too, and makes the same ticks.
 
     Tick k belongs at `start + k · timestep`. It is never skipped: on a machine that cannot keep up, simulated time lags
     the wall clock, later ticks follow without a pause until the lag is made up, and every tick that begins more than a
