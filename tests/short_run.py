@@ -8,11 +8,12 @@ from typing import Any
 
 import mujoco
 
-from wbmpc.loop import LoopTiming, Session, run_lockstep
+from wbmpc.loop import Session, run_lockstep
 from wbmpc.plant import Plant
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world, load_scenario, robot_path
+from wbmpc.timing import LoopTiming
 
 ROOT = Path(__file__).parents[1]
 ROBOT = Robot.load(ROOT / "models" / "surena_mini.xml")

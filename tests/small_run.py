@@ -69,7 +69,9 @@ def compile_model() -> mujoco.MjModel:
 
 
 def new_recorder(expected_ticks: int = 100) -> Recorder:
-    return Recorder(Robot(), expected_ticks=expected_ticks)
+    recorder = Recorder(Robot(), expected_ticks=expected_ticks)
+    recorder.timing.begin(timestep=TICK, realtime=True)
+    return recorder
 
 
 def append_ticks(recorder: Recorder, count: int, *, seed: int = 0) -> None:
@@ -77,8 +79,10 @@ def append_ticks(recorder: Recorder, count: int, *, seed: int = 0) -> None:
     for k in range(recorder.ticks, recorder.ticks + count):
         rng = np.random.default_rng([seed, k])
         recorder.append(*made_up_tick(k, rng))
+        recorder.timing.tick(late=4e-3 if k == 47 else 1e-5, duration=6e-3 if k == 33 else 5e-4)
         if k % PLAN_EVERY == 0:
             recorder.append_plan(made_up_plan(k, rng))
+            recorder.timing.plan(snapshot=k, effect=k + 4 + k % 3)
 
 
 def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, Setpoint, TorqueCommand]:

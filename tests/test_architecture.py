@@ -16,7 +16,7 @@ BASE = {"signals", "errors", "strict", "rotations", "jit"}
 ROBOT = BASE | {"model_contract", "robot", "kinematics", "frame_terms"}
 SETTINGS = BASE | {"settings", "scenario"}
 CONTROLLER = ROBOT | SETTINGS | {"qp"}
-RECORDS = BASE | {"recorder"}
+RECORDS = BASE | {"timing", "recorder"}
 LOOP = CONTROLLER | RECORDS | {"initial", "plant", "estimator", "planner", "tracker", "mailbox", "loop"}
 
 # Component -> the components that it may import, itself included. signals <- robot <- {plant, estimator,
@@ -41,6 +41,7 @@ ALLOWED = {
     "qp": BASE | {"qp"},
     "planner": CONTROLLER | {"planner"},  # knows nothing of the plant or of the tracker
     "tracker": CONTROLLER | {"tracker"},
+    "timing": {"timing"},
     "recorder": RECORDS,
     "footage": RECORDS | {"footage"},
     "render": RECORDS | {"footage", "render"},
@@ -58,10 +59,14 @@ ALLOWED = {
     "verdict": RECORDS | {"checks", "versions", "verdict"},
     "junit": {"checks", "junit"},
     "counterfactuals": SETTINGS | {"verdict", "counterfactuals"},
-    "session": LOOP | {"checks", "facts", "metrics", "verdict", "versions", "rerun_sink", "realtime", "session"},
+    "provenance": SETTINGS | {"versions", "provenance"},
+    "session": LOOP
+    | {"checks", "facts", "metrics", "verdict", "versions", "provenance", "rerun_sink", "realtime", "session"},
+    "replay": LOOP | {"provenance", "rerun_sink", "replay"},
     "sweep_journal": BASE | {"sweep_journal"},
     "pool": {"pool"},
-    "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "pool", "sweep"},
+    "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "pool", "versions", "sweep"},
+    "latency": SETTINGS | {"verdict", "session", "pool", "latency"},
     "commands": None,  # anything
     "cli": {"commands", "scenario", "versions", "pool", "cli"},
     "__main__": {"cli", "__main__"},

@@ -23,6 +23,7 @@ from wbmpc.commands.one_run import dump_last_states
 from wbmpc.counterfactuals import objection
 from wbmpc.errors import WbmpcError
 from wbmpc.scenario import Counterfactual
+from wbmpc.timing import LoopTiming
 from wbmpc.verdict import Verdict
 
 STAND = Path(__file__).parents[1] / "scenarios" / "stand.yaml"
@@ -36,6 +37,19 @@ counterfactuals:
   same: {{set: {{seed: 5}}, expect: pass}}
 """
 KEYS = ["scenario", "seed", "passed", "checks", "metrics", "solver", "timing", "versions", "state_sha256"]
+KEPT_UP: dict[str, float] = {
+    "real_time_factor": 1.5,
+    "planner_rate": 98.5,
+    "plans": 200,
+    "late_plans": 10,
+    "skipped_plans": 7,
+    "plan_latency_p50": 0.006,
+    "plan_latency_p99": 0.012,
+    "plan_latency_max": 0.015,
+    "missed_deadlines": 3,
+    "ticks": 2000,
+    "drift": 0.004,
+}
 CHECK_KEYS = ["name", "passed", "value", "threshold", "unit", "message", "first_violation"]
 
 
@@ -50,8 +64,7 @@ def verdict(name: str, checks: list[CheckResult], seed: int = 0) -> Verdict:
         checks=checks,
         metrics={"com_height_min": 0.2, "first_hand_contact": float("nan"), "simulated_time": 2.0},
         solver={"tracker": {"solves": 10, "failures": 0, "p50": 1e-4, "p99": 2e-4, "max": 3e-4}},
-        real_time_factor=1.5,
-        missed_deadlines=0,
+        timing=LoopTiming(expected_ticks=1).summary() | KEPT_UP,
         state_sha256="ab" * 32,
     )
 
@@ -107,14 +120,8 @@ def test_a_passing_run_exits_0_and_leaves_its_verdict(
     assert all(list(row) == CHECK_KEYS for row in document["checks"])
     assert (document["passed"], document["seed"], document["state_sha256"]) == (True, 3, "ab" * 32)
     assert document["metrics"]["first_hand_contact"] is None  # JSON has no nan
-    assert document["timing"] == {
-        "real_time_factor": 1.5,
-        "missed_deadlines": 0,
-        "late_plans": 0,
-        "skipped_plans": 0,
-        "plan_latency_p50": None,
-        "plan_latency_p99": None,
-    }
+    assert document["timing"]["real_time_factor"] == 1.5
+    assert document["timing"]["tick_late_max"] is None
     assert document["versions"]["mujoco"] != "absent"
 
 
@@ -136,6 +143,15 @@ def test_options_reach_the_run(call: Any, fake: list[Any], scenario: Path, tmp_p
     assert [run.scenario.duration for run in fake] == [1.75, 2.0]
 
 
+def test_a_real_time_run_says_how_it_kept_up(call: Any, fake: list[Any], scenario: Path, tmp_path: Path) -> None:
+    result = call("run", scenario, "--out", tmp_path, "--realtime")
+    (line,) = (line for line in result.output.splitlines() if "plans/s" in line)
+    plans, ticks = line.split("; ")
+    assert plans == "calm: 98.5 plans/s, 5.0 % late, 7 skipped, latency [ms] p50 6, p99 12, max 15"
+    assert ticks == "3 of 2000 ticks missed, drift 0.004 s"
+    assert "plans/s" not in call("run", scenario, "--out", tmp_path).output
+
+
 def test_counterfactuals_pass_when_they_end_as_declared(
     call: Any, fake: list[Any], scenario: Path, tmp_path: Path
 ) -> None:
@@ -148,6 +164,7 @@ def test_counterfactuals_pass_when_they_end_as_declared(
         "runs: 3/3 PASS calm.same: passes, as declared",
     ]
     rows = [" ".join(line.split()) for line in result.output.splitlines()]
+    assert any(row.endswith("failing checks simulated [s] wall [s]") for row in rows)
     assert "calm pass PASS upright_at_end 0.5 m, torque_peak 0.5 m 2.0 0.1" in rows
     assert "weak fail: torque_peak PASS fails torque_peak 2 m 2.0 0.1" in rows
     assert rows[-1] == "PASS: all 3 runs ended as declared"

@@ -67,7 +67,7 @@ def test_a_plan_takes_effect_after_its_delay_and_not_before(
         assert used == pytest.approx(1e-3 * max(ready, default=0), abs=1e-9), tick
     assert recorder.ticks == 60
     assert len(recorder.plans) == 1 + 59 * planner_rate // 1000
-    assert timing.plan_latency == [delay] * (len(recorder.plans) - 1)
+    np.testing.assert_allclose(timing.plan_latency, np.full(len(recorder.plans) - 1, delay), atol=1e-12)
     assert timing.missed_deadlines == timing.late_plans == 0
 
 

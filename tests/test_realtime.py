@@ -6,6 +6,7 @@ import gc
 import sys
 from collections.abc import Callable
 from threading import Event, Semaphore, active_count
+from time import perf_counter, sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,13 +14,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from short_run import ROBOT, finished, new_recorder, new_session, stand
+from short_run import ROBOT, finished, new_recorder, stand
 
 from wbmpc import realtime
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.realtime import PlannerThread, run_realtime
 from wbmpc.signals import RobotState
+from wbmpc.timing import LoopTiming, Schedule
 
 STAND = stand()
 
@@ -50,19 +52,12 @@ def test_replay_in_lockstep_repeats_the_bits() -> None:
     """What makes a threaded run unrepeatable is when its plans are ready: charge that, and nothing else is left."""
     scenario = stand(duration=0.3, sensors__noise_scale=1.0, seed=5)
     timing, recorder = finished(scenario, run=run_realtime)
-    ready = {
-        round(1e3 * plan.time): latency for plan, latency in zip(recorder.plans[1:], timing.plan_latency, strict=True)
-    }
-    assert ready
-
-    session, replayed = new_session(scenario)
-
-    def plan(state: RobotState) -> None:
-        session.mailbox.post(session.planner.solve(state), available_at=state.time + ready[round(1e3 * state.time)])
-
-    for tick in range(session.ticks):
-        session.tick(plan if tick in ready else None)
+    assert timing.effects
+    assert all(effect > snapshot for snapshot, effect in zip(timing.snapshots, timing.effects, strict=True))
+    schedule = Schedule(dict(zip(timing.snapshots, timing.effects, strict=True)), recorder.ticks)
+    again, replayed = finished(scenario, schedule=schedule)
     assert replayed.state_sha256 == recorder.state_sha256
+    assert (again.snapshots, again.effects) == (timing.snapshots, timing.effects)
 
 
 def test_an_error_of_the_planner_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,8 +73,9 @@ def test_an_error_of_the_planner_surfaces(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(Planner, "solve", failing)
     threads, interval = active_count(), sys.getswitchinterval()
     recorder = new_recorder(scenario := stand(duration=2.0))
-    with pytest.raises(ZeroDivisionError, match="the third plan"):
+    with pytest.raises(RuntimeError, match=r"snapshot of 0.0\d0 s: ZeroDivisionError: the third plan") as raised:
         run_realtime(scenario, robot=ROBOT, recorder=recorder)
+    assert isinstance(raised.value.__cause__, ZeroDivisionError)
     assert recorder.ticks < 1000  # at once, not at the end
     assert active_count() == threads
     assert gc.isenabled()
@@ -124,7 +120,8 @@ def run_with_tick_times(durations: list[float]) -> tuple[Any, list[float]]:
         patch.setattr(realtime, "_warm_up", lambda *args: None)
         patch.setattr(realtime, "perf_counter", clock.perf_counter)
         patch.setattr(realtime, "sleep", clock.sleep)
-        timing = run_realtime(STAND, robot=ROBOT, recorder=None, model=object())  # type: ignore[arg-type]
+        recorder: Any = SimpleNamespace(timing=LoopTiming(expected_ticks=8))
+        timing = run_realtime(STAND, robot=ROBOT, recorder=recorder, model=object())  # type: ignore[arg-type]
     return timing, begins
 
 
@@ -141,6 +138,9 @@ def test_ticks_begin_at_their_slot_or_as_soon_as_the_last_one_ends(durations: li
     late = np.array(expected) - 1e-3 * np.arange(len(durations))
     assert np.sum(late > 1e-3 + 1e-9) <= timing.missed_deadlines <= np.sum(late > 1e-3 - margin)
     assert timing.wall_time == pytest.approx(free, abs=margin)
+    np.testing.assert_allclose(timing.tick_late, late, atol=margin)
+    np.testing.assert_allclose(timing.tick_time, durations, atol=margin)
+    assert timing.summary()["tick_late_max"] == timing.tick_late.max()
 
 
 class GatedPlanner:
@@ -174,19 +174,26 @@ def test_the_planner_takes_the_newest_snapshot_and_leaves_out_older_ones() -> No
 
 
 def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The planner waits, so that the machine has nothing else to do: then ticks go on and plans come late."""
-    solve, sleep = Planner.solve, realtime.sleep
+    """However fast the machine, each plan waits for 35 ticks: they go on, on the tail of the plan before."""
+    solve, recorder = Planner.solve, new_recorder(scenario := stand(duration=0.4))
+    give_up = perf_counter() + 120.0
 
     def slow(planner: Planner, state: RobotState) -> Any:
-        if state.time > 0.0:
-            sleep(0.035)
+        while state.time > 0.0 and recorder.ticks < min(round(1e3 * state.time) + 35, 400):
+            assert perf_counter() < give_up
+            sleep(1e-3)
         return solve(planner, state)
 
     monkeypatch.setattr(Planner, "solve", slow)
-    timing, recorder = finished(stand(duration=0.4), run=run_realtime)
-    assert recorder.ticks == 400
-    assert timing.skipped_plans >= 1
-    assert timing.late_plans >= 1
+    timing = run_realtime(scenario, robot=ROBOT, recorder=recorder)
+    assert recorder.ticks == timing.ticks == 400
+    assert recorder.torso_up.min() > 0.99
+    assert timing.plan_latency.min() > 0.0345
+    assert timing.late_plans == len(timing.effects) == len(recorder.plans) - 1 >= 1
+    assert timing.skipped_plans >= 2 * (timing.late_plans - 1)  # between two that are planned, 35 ticks or more apart
+    summary = timing.summary()
+    assert summary["late_plans"] == summary["plans"]
+    assert summary["plan_latency_max"] >= summary["plan_latency_p50"] > 0.0345
 
 
 def test_mailbox_gives_each_plan_once_and_never_early() -> None:

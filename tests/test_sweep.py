@@ -19,8 +19,9 @@ import wbmpc.commands.sweep as command
 from wbmpc.cli import app
 from wbmpc.errors import WbmpcError
 from wbmpc.scenario import Variation, load_scenario
-from wbmpc.sweep import Draw, draw_values, header_of, run_draws, scenario_of, severity, source_hash
+from wbmpc.sweep import Draw, draw_values, header_of, run_draws, scenario_of, severity
 from wbmpc.sweep_journal import Journal
+from wbmpc.versions import source_hash
 
 SCENARIO = """
 name: calm

@@ -20,6 +20,8 @@ app = typer.Typer(
 
 Files = Annotated[list[Path], typer.Argument(metavar="SCENARIO", help="Scenario files (YAML).", show_default=False)]
 ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (YAML).", show_default=False)]
+RecordingFile = Annotated[Path, typer.Argument(metavar="RECORDING", help="An .rrd file.", show_default=False)]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers [the scenario's].")]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
 Overrides = Annotated[
     list[str],
@@ -65,7 +67,7 @@ def run_command(
     scenarios: Files,
     overrides: Overrides,
     out: Out = Path("out"),
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers [the scenario's].")] = None,
+    seed: Seed = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Wall clock, the planner in its own thread.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no .rrd file.")] = False,
     counterfactuals: Annotated[
@@ -137,9 +139,50 @@ def sweep_command(
     raise typer.Exit(guarded(work, traceback_path=out / "sweep.traceback.txt", debug=debug))
 
 
+@app.command("latency", help="Run a scenario at growing plan delays, and find the one at which it begins to fail.")
+def latency_command(
+    scenario: ScenarioFile,
+    overrides: Overrides,
+    delays: Annotated[
+        list[float] | None,
+        typer.Option("--delay", min=0, help="[ms] repeatable [0 10 20 40 60 80 100 150 200]; then bisected."),
+    ] = None,
+    jobs: Jobs = None,
+    seed: Seed = None,
+    out: Out = Path("out"),
+    suffix: Annotated[str, typer.Option("--format", help="Of the figure: webp, png, pdf, svg.")] = "webp",
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.latency import LatencyOptions, latency
+        from wbmpc.scenario import parse_overrides
+
+        changes = parse_overrides(overrides)
+        options = LatencyOptions(delays=delays or [], jobs=jobs, seed=seed, out=out, suffix=suffix, overrides=changes)
+        return latency(scenario, options)
+
+    raise typer.Exit(guarded(work, traceback_path=out / "latency.traceback.txt", debug=debug))
+
+
+@app.command("replay", help="Make a recording's run again in lockstep, plan by plan; exit code 1 when a bit differs.")
+def replay_command(
+    recording: RecordingFile,
+    robot: Annotated[
+        Path | None, typer.Option("--robot", metavar="FILE", help="The robot's MJCF, if it is elsewhere now.")
+    ] = None,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.replay import replay
+
+        return replay(recording, robot=robot)
+
+    raise typer.Exit(guarded(work, traceback_path=Path("out/replay.traceback.txt"), debug=debug))
+
+
 @app.command("render", help="Draw a recording (.rrd) without a screen: a picture, a strip of them, or an animation.")
 def render_command(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING", help="An .rrd file.", show_default=False)],
+    recording: RecordingFile,
     target: Annotated[
         Path, typer.Option("--out", metavar="FILE", help=".png; .webp or .gif: animated unless one --time is given.")
     ] = Path("out/render.png"),

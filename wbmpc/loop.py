@@ -5,7 +5,6 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Protocol
 
@@ -22,6 +21,7 @@ from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world, resolve_ground, resolve_loads, resolve_obstacles, resolve_patches
 from wbmpc.signals import RobotState, Vector
+from wbmpc.timing import LoopTiming, Schedule
 from wbmpc.tracker.tracker import Tracker
 
 DIVERGED = 1e6  # [rad/s, m/s] no robot moves so fast: the simulation has lost it
@@ -43,23 +43,6 @@ class Sink(Protocol):
     def flush(self, now: float) -> None:
         """Write what was recorded up to `now` [s]."""
         ...
-
-
-@dataclass(slots=True)
-class LoopTiming:
-    """What a loop's clock saw. Never part of a verdict."""
-
-    wall_time: float = 0.0  # [s]
-    simulated_time: float = 0.0  # [s]
-    missed_deadlines: int = 0  # ticks that began late against the wall clock; 0 in lockstep
-    late_plans: int = 0  # plans that were not ready one planner period after their snapshot; 0 in lockstep
-    skipped_plans: int = 0  # snapshots that a newer one replaced before the planner came to them; 0 in lockstep
-    plan_latency: list[float] = field(default_factory=list)  # [s] loop time from a plan's snapshot to its availability
-
-    @property
-    def drift(self) -> float:
-        """By how much simulated time lags the wall clock at the end [s]; negative when it is ahead."""
-        return self.wall_time - self.simulated_time
 
 
 class Session:
@@ -133,35 +116,50 @@ def run_lockstep(
     sink: Sink | None = None,
     on_progress: Callable[[float], None] | None = None,
     ended: Callable[[], str | None] | None = None,
+    schedule: Schedule | None = None,
 ) -> LoopTiming:
     """Run a scenario in simulated time: the same seed gives the same bits on any machine, however slow.
 
-    A plan takes effect `loop.planner_delay` after its snapshot, in simulated time. A state that is not finite ends the
-    run early; the recorder then holds fewer ticks than the scenario asks for, and the checks say so.
+    A plan takes effect `loop.planner_delay` after its snapshot, in simulated time, or when a schedule says so. A state
+    that is not finite ends the run early; the recorder then holds fewer ticks than the scenario asks for, and the
+    checks say so.
 
     Args:
         model: the world; built from the scenario when not given.
         sink: flushed every half simulated second.
         on_progress: called with the simulated time [s] at every flush.
         ended: asked at every flush; a reason, which goes to the recorder's events, ends the run.
+        schedule: when plans take effect, such as a threaded run's recorded one, which then repeats bit for bit; every
+            planner period with the scenario's delay when not given.
+
+    Returns:
+        The recorder's `timing`.
     """
     if model is None:
         model = build_world(scenario, robot.path)
     session = Session(scenario, robot=robot, model=model, recorder=recorder)
-    loop, timing = scenario.loop, LoopTiming()
-    delay = loop.planner_delay_ticks * session.step
+    loop, timing = scenario.loop, recorder.timing
+    if schedule is None:
+        schedule = Schedule.constant(
+            period=loop.planner_period_ticks, delay=loop.planner_delay_ticks, ticks=session.ticks
+        )
+    effects = schedule.effects
+    timing.begin(timestep=session.step, realtime=False)
 
     def plan(state: RobotState) -> None:
+        tick = recorder.ticks  # which is being made
         solved = session.planner.solve(state)
-        session.mailbox.post(solved, available_at=state.time + delay)
+        session.mailbox.post(solved, available_at=state.time + (effects[tick] - tick) * session.step)
         recorder.append_plan(solved.report)
-        timing.plan_latency.append(delay)
+        timing.plan(snapshot=tick, effect=effects[tick])
 
     with no_garbage_collection():
         start = perf_counter()
-        for k in range(session.ticks):
-            due = k % loop.planner_period_ticks == 0 and k > 0
-            if not session.tick(plan if due else None):
+        for k in range(schedule.ticks):
+            began = perf_counter()
+            sound = session.tick(plan if k in effects else None)
+            timing.tick(0.0, perf_counter() - began)
+            if not sound:
                 recorder.event(session.plant.time, "state is not finite, run ended")
                 break
             if (k + 1) % FLUSH_TICKS == 0:

@@ -11,13 +11,14 @@ from time import perf_counter, sleep
 
 import mujoco
 
-from wbmpc.loop import FLUSH_TICKS, LoopTiming, Session, Sink, no_garbage_collection
+from wbmpc.loop import FLUSH_TICKS, Session, Sink, no_garbage_collection
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world
 from wbmpc.signals import RobotState
+from wbmpc.timing import LoopTiming
 
 SPIN = 3e-4  # [s] before a deadline in which the tick thread no longer trusts a sleep to end in time
 SWITCH_INTERVAL = 1e-4  # [s] after which the tick thread, awake, gets the interpreter back from the planner
@@ -34,28 +35,33 @@ def run_realtime(
     on_progress: Callable[[float], None] | None = None,
     ended: Callable[[], str | None] | None = None,
 ) -> LoopTiming:
-    """Run a scenario against the wall clock; `run_lockstep` has the same arguments and makes the same ticks.
+    """Run a scenario against the wall clock; `run_lockstep` has these arguments too, and makes the same ticks.
 
     Tick k belongs at `start + k · timestep`. It is never skipped: on a machine that cannot keep up, simulated time lags
     the wall clock, later ticks follow without a pause until the lag is made up, and every tick that begins more than a
     timestep late counts as a missed deadline.
 
     A plan takes effect at the first tick after it is ready. Its latency is counted in the loop's time, from the state
-    it was computed from to that tick, so that a lockstep run that charges the recorded latencies to the plans at their
-    recorded times repeats the run bit for bit. A plan later than one planner period is counted; a snapshot that a
-    newer one replaced before the planner came to it is counted as skipped.
+    it was computed from to that tick, so that a lockstep run whose `schedule` charges the recorded latencies to the
+    plans at their recorded times repeats the run bit for bit. A plan later than one planner period is counted; until it
+    comes the one before it is continued. A snapshot that a newer one replaced before the planner came to it is counted
+    as skipped.
 
     Args:
         sink: flushed once, after the last tick, because a flush waits for the file: a killed run leaves an empty one.
 
+    Returns:
+        The recorder's `timing`.
+
     Raises:
-        Exception: whatever the planner raised in its thread.
+        RuntimeError: the planner raised in its thread; says what, and on which snapshot.
     """
     if model is None:
         model = build_world(scenario, robot.path)
     _warm_up(scenario, robot, model)
     session = Session(scenario, robot=robot, model=model, recorder=recorder)
-    period, step, timing = scenario.loop.planner_period_ticks, session.step, LoopTiming()
+    period, step, timing = scenario.loop.planner_period_ticks, session.step, recorder.timing
+    timing.begin(timestep=step, realtime=True)
     finished = Mailbox()  # the tracker sees a plan only when the tick has taken it over and counted its latency
     worker = PlannerThread(session.planner, finished)
     due = False
@@ -66,9 +72,9 @@ def run_realtime(
         for plan in finished.arrived(state.time):
             session.mailbox.post(plan, available_at=state.time)
             recorder.append_plan(plan.report)
-            latency = state.time - plan.time
-            timing.plan_latency.append(latency)
-            timing.late_plans += latency > (period + 0.5) * step
+            snapshot, effect = round(plan.time / step), recorder.ticks
+            timing.plan(snapshot=snapshot, effect=effect)
+            timing.late_plans += effect - snapshot > period
         if due:
             worker.request(state)
 
@@ -76,9 +82,12 @@ def run_realtime(
         start = perf_counter()
         for k in range(session.ticks):
             slot = start + k * step
-            timing.missed_deadlines += _wait_until(slot) > step
+            late = _wait_until(slot)
+            timing.missed_deadlines += late > step
             due = k % period == 0 and k > 0
-            if not session.tick(exchange):
+            sound = session.tick(exchange)
+            timing.tick(late, perf_counter() - slot - late)
+            if not sound:
                 recorder.event(session.plant.time, "state is not finite, run ended")
                 break
             if (k + 1) % FLUSH_TICKS == 0:
@@ -107,6 +116,7 @@ class PlannerThread:
         self._requests: SimpleQueue[RobotState | None] = SimpleQueue()  # None: stop
         self._thread = Thread(target=self._run, name="planner", daemon=True)
         self._error: BaseException | None = None
+        self._at = 0.0  # [s] time of the snapshot in work
         self.skipped = 0  # snapshots that a newer one replaced
 
     def request(self, snapshot: RobotState) -> None:
@@ -114,9 +124,12 @@ class PlannerThread:
         self._requests.put(snapshot)
 
     def check(self) -> None:
-        """Raise what the planner raised."""
+        """Raise a RuntimeError when the planner has raised, from what it raised."""
         if self._error is not None:
-            raise self._error
+            what = f"{type(self._error).__name__}: {self._error}"
+            raise RuntimeError(
+                f"the planner's thread ended on the snapshot of {self._at:.3f} s: {what}"
+            ) from self._error
 
     def __enter__(self) -> PlannerThread:
         self._thread.start()
@@ -129,6 +142,7 @@ class PlannerThread:
     def _run(self) -> None:
         try:
             while (snapshot := self._newest()) is not None:
+                self._at = snapshot.time
                 # Ready is ready: whichever tick comes next may use it.
                 self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
         except BaseException as error:  # a thread cannot raise into another: `check` does

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.signals import PlanReport, RobotState, Setpoint, TorqueCommand, Truth
+from wbmpc.timing import LoopTiming
 
 
 class RobotDimensions(Protocol):
@@ -157,6 +158,7 @@ class Recorder:
         self._hash = hashlib.sha256()
         self.plans: list[PlanReport] = []
         self.events: list[Event] = []
+        self.timing = LoopTiming(expected_ticks=expected_ticks)  # filled by the loop; wall times, never compared
 
     # ---------------------------------------------------------------- writing
 

@@ -15,12 +15,14 @@ from wbmpc.checks.context import CheckContext
 from wbmpc.checks.fall import FallWatch
 from wbmpc.checks.registry import evaluate_checks
 from wbmpc.facts import facts_of
-from wbmpc.loop import LoopTiming, run_lockstep
+from wbmpc.loop import run_lockstep
 from wbmpc.metrics import metrics_of
+from wbmpc.provenance import document_of
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose, Scenario, build_world, resolve_patches, robot_path
 from wbmpc.signals import Vector
+from wbmpc.timing import LoopTiming
 from wbmpc.verdict import Verdict, solver_statistics
 from wbmpc.versions import versions
 
@@ -63,7 +65,7 @@ def run_scenario(
     ticks = round(scenario.duration * scenario.loop.physics_rate)
     recorder = Recorder(robot, expected_ticks=ticks, plant_nq=model.nq, plant_nv=model.nv)
     run = _loop(realtime)
-    with _sink(recording, name, scenario, model, robot, recorder, patches) as sink:
+    with _sink(recording, name, scenario, model, robot, recorder, patches, realtime) as sink:
         fallen = FallWatch(recorder, scenario.universal.no_fall, timestep=model.opt.timestep)
         timing = run(
             scenario,
@@ -81,11 +83,7 @@ def run_scenario(
             checks=evaluate_checks(context, universal=scenario.universal, checks=scenario.checks),
             metrics=metrics_of(context),
             solver=solver_statistics(recorder),
-            real_time_factor=timing.simulated_time / timing.wall_time if timing.wall_time > 0 else 0.0,
-            missed_deadlines=timing.missed_deadlines,
-            late_plans=timing.late_plans,
-            skipped_plans=timing.skipped_plans,
-            plan_latency=timing.plan_latency,
+            timing=timing.summary(),
             state_sha256=recorder.state_sha256,
         )
         if sink is not None:
@@ -109,6 +107,7 @@ def _sink(  # type: ignore[no-untyped-def]  # a context manager of a RerunSink, 
     robot: Robot,
     recorder: Recorder,
     patches: Sequence[PatchPose],
+    realtime: bool,
 ):
     if path is None:
         return nullcontext(None)
@@ -127,6 +126,7 @@ def _sink(  # type: ignore[no-untyped-def]  # a context manager of a RerunSink, 
         knot_period=scenario.planner.horizon_step,
         patches=[Patch(patch.name, _square(patch), patch.normal) for patch in patches],
         versions=versions(),
+        replay=document_of(scenario, name, realtime=realtime),
     )
 
 

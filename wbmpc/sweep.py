@@ -22,6 +22,7 @@ from wbmpc.pool import Died, finished
 from wbmpc.scenario import Scenario, Variation, load_scenario, vary
 from wbmpc.sweep_journal import Journal
 from wbmpc.verdict import Verdict, finite
+from wbmpc.versions import source_hash
 
 DIGITS = 6  # significant digits of a drawn number: what the reproduce command shows is what ran
 
@@ -146,15 +147,6 @@ def severity(row: Mapping[str, Any], ignored: Sequence[str] = ()) -> tuple[int, 
             distance = abs(check["value"] - check["threshold"]) / abs(check["threshold"])
             worst = max(worst, -distance if check["passed"] else distance)
     return sum(not check["passed"] for check in row["checks"]), worst
-
-
-def source_hash(root: Path | None = None) -> str:
-    """Digest of the program's own source: rows of another version must not be mixed with new ones."""
-    root = root or Path(__file__).parent
-    digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        digest.update(str(path.relative_to(root)).encode() + b"\0" + path.read_bytes() + b"\0")
-    return digest.hexdigest()
 
 
 def header_of(path: Path, *, seed: int, overrides: Mapping[str, JsonValue], robot: Path) -> dict[str, Any]:

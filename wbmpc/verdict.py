@@ -26,12 +26,8 @@ class Verdict:
     checks: Sequence[CheckResult]
     metrics: Mapping[str, float]
     solver: Mapping[str, Mapping[str, float]]
-    real_time_factor: float  # simulated time per wall time
-    missed_deadlines: int
+    timing: Mapping[str, float]  # wall times: LoopTiming.summary
     state_sha256: str
-    late_plans: int = 0
-    skipped_plans: int = 0
-    plan_latency: Sequence[float] = ()  # [s] of every plan
     versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
@@ -44,6 +40,11 @@ class Verdict:
         """Names of the failed checks."""
         return tuple(check.name for check in self.checks if not check.passed)
 
+    @property
+    def real_time_factor(self) -> float:
+        """Simulated time per wall time."""
+        return self.timing["real_time_factor"]
+
     def as_dict(self) -> dict[str, Any]:
         """The JSON document: only finite numbers, None where a value could not be measured."""
         document = {
@@ -53,22 +54,11 @@ class Verdict:
             "checks": [asdict(check) for check in self.checks],
             "metrics": dict(self.metrics),
             "solver": {stage: dict(row) for stage, row in self.solver.items()},
-            "timing": self._timing(),
+            "timing": dict(self.timing),
             "versions": dict(self.versions),
             "state_sha256": self.state_sha256,
         }
         return finite(document)
-
-    def _timing(self) -> dict[str, float]:
-        p50, p99 = np.percentile(self.plan_latency, [50, 99]) if self.plan_latency else (math.nan, math.nan)
-        return {
-            "real_time_factor": self.real_time_factor,
-            "missed_deadlines": self.missed_deadlines,
-            "late_plans": self.late_plans,
-            "skipped_plans": self.skipped_plans,
-            "plan_latency_p50": float(p50),
-            "plan_latency_p99": float(p99),
-        }
 
     def write(self, path: Path) -> None:
         """Write the JSON document to `path`, whole or not at all."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from math import nan
 from pathlib import Path
 
@@ -69,6 +69,7 @@ class Outcome:
     simulated_time: float = nan  # [s]
     wall_time: float = nan  # [s]
     real_time_factor: float = nan
+    timing: Mapping[str, float] = field(default_factory=dict)
     traceback: str = ""  # of an internal error
 
 
@@ -131,4 +132,5 @@ def _outcome(job: Job, verdict: Verdict, wall_time: float) -> Outcome:
         simulated_time=verdict.metrics.get("simulated_time", nan),
         wall_time=wall_time,
         real_time_factor=verdict.real_time_factor,
+        timing=verdict.timing,
     )

@@ -13,7 +13,7 @@ from wbmpc.commands.exits import ExitCode, say
 from wbmpc.commands.one_run import Job, Outcome, broken, carry_out
 from wbmpc.commands.progress import counted, simulated_time
 from wbmpc.commands.summary import print_runs
-from wbmpc.commands.tables import print_checks
+from wbmpc.commands.tables import print_checks, timing_line
 from wbmpc.errors import WbmpcError
 from wbmpc.junit import write_junit
 from wbmpc.pool import Died, available_cores, finished
@@ -122,5 +122,7 @@ def _report(ended: Sequence[tuple[Job, Outcome]], *, single: bool) -> None:
         if single and outcome.checks:
             title = f"{job.name}  (seed {outcome.seed}, real-time factor {outcome.real_time_factor:.2f})"
             print_checks(title, outcome.checks)
+        if job.realtime and outcome.timing:
+            print(timing_line(job.name, outcome.timing), flush=True)
         if single or outcome.code is not ExitCode.PASSED:
             print(outcome.line, flush=True)

@@ -24,7 +24,7 @@ def print_runs(ended: Sequence[tuple[Job, Outcome]]) -> None:
     table.add_column("verdict", no_wrap=True)
     table.add_column("values, or failing checks", overflow="fold")
     for heading in ("simulated [s]", "wall [s]"):
-        table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column(Text(heading), justify="right", no_wrap=True)  # rich takes a plain "[s]" for markup
     universal = tuple(UniversalSettings.model_fields)
     previous = ""
     for job, outcome in sorted(ended, key=lambda pair: pair[1].code):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from rich import box
 from rich.console import Console
@@ -39,6 +39,17 @@ def print_checks(title: str, checks: Sequence[CheckResult]) -> None:
         row = (check.name, number(check.value), number(check.threshold), check.unit)
         table.add_row(*(Text(cell) for cell in row), result, Text(check.message + when))
     console().print(table)
+
+
+def timing_line(name: str, timing: Mapping[str, float]) -> str:
+    """How a real-time run kept up, from its verdict's `timing`."""
+    late = 100 * timing["late_plans"] / max(timing["plans"], 1)
+    latency = ", ".join(f"{level} {number(1e3 * timing[f'plan_latency_{level}'])}" for level in ("p50", "p99", "max"))
+    return (
+        f"{name}: {number(timing['planner_rate'])} plans/s, {late:.1f} % late, {timing['skipped_plans']} skipped, "
+        f"latency [ms] {latency}; {timing['missed_deadlines']} of {timing['ticks']} ticks missed, "
+        f"drift {timing['drift']:.3f} s"
+    )
 
 
 def final_line(name: str, failures: Sequence[CheckResult], note: str = "") -> str:

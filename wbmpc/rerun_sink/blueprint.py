@@ -46,6 +46,11 @@ _PLOTS = {
         "Tracker [ms]": "/solvers/tracker",
         "Iterations": "/solvers/iterations",
     },
+    "Timing": {
+        "Tick began late [ms]": "/timing/tick_start_late",
+        "Tick [ms]": "/timing/tick_time",
+        "Plan latency [ms]": "/timing/plan_latency",
+    },
 }
 # Tab -> title and entity of the state lanes under its plots.
 _PHASES = ("Contact phases", "/contact_phase")

@@ -18,9 +18,11 @@ from wbmpc.rerun_sink.blueprint import layout
 from wbmpc.rerun_sink.documents import verdict_document
 from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.plans import describe_plans, write_plans
+from wbmpc.rerun_sink.rerunning import describe_run, write_progress
 from wbmpc.rerun_sink.scene import Patch, Scene
 from wbmpc.rerun_sink.stream import Stream
 from wbmpc.rerun_sink.ticks import describe_ticks, write_ticks, write_tracker_status
+from wbmpc.rerun_sink.timing import describe_timing, write_plan_timing, write_tick_timing
 
 APPLICATION = "wbmpc"
 
@@ -38,6 +40,7 @@ class RerunSink:
         knot_period: T of the planner [s], to draw a plan's first knot at the time it speaks of.
         patches: candidate contact patches of the scene.
         versions: names and versions of the programs that made the run.
+        replay: what `wbmpc replay` needs besides the plans' times, as data; None: cannot be replayed.
         block: simulated time between two writes [s]; what a killed run can lose.
 
     Raises:
@@ -59,13 +62,14 @@ class RerunSink:
         knot_period: float = 0.1,
         patches: Sequence[Patch] = (),
         versions: Mapping[str, str] | None = None,
+        replay: Mapping[str, Any] | None = None,
         block: float = 2.0,
     ) -> None:
         self._stride = _stride(tick_rate, rate)
         self._recorder, self._block, self._knot_period = recorder, block, knot_period
         self._patches = {patch.name: patch for patch in patches}
         self._next_flush = block
-        self._ticks_done = self._plans_done = self._events_done = 0
+        self._ticks_done = self._plans_done = self._events_done = self._timed_done = 0
         self._closed = False
 
         recording = rr.RecordingStream(APPLICATION)
@@ -80,6 +84,9 @@ class RerunSink:
         self._scene = Scene(self._stream, model, patches)
         describe_ticks(self._stream, joint_names)
         describe_plans(self._stream)
+        describe_timing(self._stream)
+        if replay is not None:
+            describe_run(self._stream, replay)
         recording.flush()  # a run killed at once still says what it was
 
     def flush(self, now: float | None = None) -> None:
@@ -94,9 +101,13 @@ class RerunSink:
         if len(rows):
             write_ticks(self._stream, recorder, rows, self._stride)
             self._scene.write_poses(recorder.time[rows], recorder.qpos[rows])
+            write_tick_timing(self._stream, recorder, rows, self._stride)
         write_tracker_status(self._stream, recorder, first)
         self._flush_plans()
         self._flush_events()
+        write_plan_timing(self._stream, recorder.timing, self._timed_done)
+        self._timed_done = len(recorder.timing.effects)
+        write_progress(self._stream, recorder, first)  # after the plans, which a replay of these ticks needs
         # Blocking: once this returns the block is in the file, whatever happens to the process.
         self._stream.recording.flush()
 

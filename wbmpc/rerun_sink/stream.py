@@ -17,6 +17,7 @@ from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
 
 TIMELINE = "time"
+_VALUES = "wbmpc"
 Colour = tuple[int, int, int]
 
 
@@ -82,6 +83,19 @@ class Stream:
         """Lines: strips[i] are the polylines, each (k, 3) [m], at time i."""
         columns = rr.LineStrips3D.columns(strips=_arrow_strips([strip for row in strips for strip in row]))
         self.columns(path, time, columns.partition([len(row) for row in strips]))
+
+    def values(self, path: str, time: NDArray[np.float64], **values: Sequence[Any]) -> None:
+        """Values that no view draws, of any type: one, or an array of them, of each name at each time."""
+        columns = [
+            column
+            for name, rows in values.items()
+            for column in rr.DynamicArchetype.columns(
+                # Named: the reader tells an archetype's components from timelines by it.
+                archetype=_VALUES,
+                components={name: np.concatenate([np.atleast_1d(row) for row in rows])},
+            ).partition([np.size(row) for row in rows])
+        ]
+        self.columns(path, time, columns)
 
     def states(self, path: str, time: NDArray[np.float64], states: Sequence[str]) -> None:
         """A lane of a state timeline: only the changes are written."""

@@ -1,0 +1,45 @@
+"""Columns of the loop's clock: how late ticks began, how long they took, how old plans were at their first use."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbmpc.recorder import Recorder
+from wbmpc.rerun_sink.palette import FAULT, MEASURED, PLANNED
+from wbmpc.rerun_sink.stream import Stream
+from wbmpc.timing import LoopTiming
+
+SCHEDULE = "/timing/schedule"
+
+
+def describe_timing(stream: Stream) -> None:
+    """Names and colours of everything that this file sends."""
+    stream.series("/timing/tick_start_late", ["latest begin since the last sample [ms]"], [FAULT])
+    stream.series("/timing/tick_time", ["longest tick since the last sample [ms]"], [MEASURED])
+    stream.series("/timing/plan_latency", ["from snapshot to first use [ms]"], [PLANNED])
+
+
+def write_tick_timing(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], stride: int) -> None:
+    """Send the ticks `rows`, every `stride`-th; each carries the worst since the one before."""
+    timing = recorder.timing
+    rows = rows[rows < timing.ticks]
+    if not len(rows):  # a recorder that no loop fills
+        return
+    time = recorder.time[rows]
+    columns = {"tick_time": timing.tick_time}
+    if timing.realtime:  # in lockstep there is no clock to be late against
+        columns["tick_start_late"] = timing.tick_late
+    for name, column in columns.items():
+        worst = [column[max(0, k - stride + 1) : k + 1].max() for k in rows]
+        stream.scalars(f"/timing/{name}", time, 1e3 * np.array(worst))
+
+
+def write_plan_timing(stream: Stream, timing: LoopTiming, since: int) -> None:
+    """Send the plans from the `since`-th on, at the times of their first use: latency, and the ticks for a replay."""
+    snapshots, effects = timing.snapshots[since:], timing.effects[since:]
+    if not effects:
+        return
+    time = np.array(effects) * timing.timestep
+    stream.scalars("/timing/plan_latency", time, 1e3 * timing.plan_latency[since:])
+    stream.values(SCHEDULE, time, snapshot_tick=snapshots, effect_tick=effects)
