@@ -174,7 +174,7 @@ def test_a_run_that_breaks_the_program_is_named(call: Any) -> None:
     ("words", "message"),
     [
         (("--delay", 0.5), "--delay 0.5: not a multiple of the timestep, 1 ms"),
-        (("--delay", 1001), "loop.planner_delay"),
+        (("--delay", 1001), "--delay 1001: loop.planner_delay must be ≤ 1"),
         (("--delay", "nan"), "--delay"),
         (("--delay", "inf"), "--delay inf"),
         (("--delay", -1), "--delay"),

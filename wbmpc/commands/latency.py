@@ -18,10 +18,10 @@ from wbmpc.commands.exits import ExitCode
 from wbmpc.commands.progress import counted
 from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import console, number
-from wbmpc.errors import WbmpcError
+from wbmpc.errors import ScenarioError, WbmpcError
 from wbmpc.figures.figure import FORMATS, save_figure
 from wbmpc.figures.latency import latency_figure
-from wbmpc.latency import Row, at_delay, boundary, first_failed, key_check, margin, run_delays
+from wbmpc.latency import KEY, Row, at_delay, boundary, first_failed, key_check, margin, run_delays
 from wbmpc.pool import available_cores
 from wbmpc.scenario import Scenario, load_scenario
 from wbmpc.verdict import write_json
@@ -48,16 +48,14 @@ def latency(path: Path, options: LatencyOptions) -> ExitCode:
     A delay at which the scenario fails is an answer: the exit code is 0 unless a run broke the program.
 
     Raises:
-        ScenarioError: the scenario, an override or a delay is not valid.
-        WbmpcError: an unknown kind of figure, or the folder cannot be made.
+        ScenarioError: the scenario or an override is not valid.
+        WbmpcError: a delay that no scenario may ask for, an unknown kind of figure, or the folder cannot be made.
     """
     suffix = f".{options.suffix.removeprefix('.')}"
     if suffix not in FORMATS:
         raise WbmpcError(f"--format {options.suffix}: choose one of {', '.join(f[1:] for f in FORMATS)}")
     scenario = load_scenario(path, options.overrides, options.seed)
-    delays = [_ticks(scenario, delay) for delay in options.delays or DELAYS]
-    for ticks in delays:
-        at_delay(scenario, ticks)  # one that is not allowed is known before minutes of runs
+    delays = [_ticks(scenario, delay) for delay in options.delays or DELAYS]  # known before minutes of runs
     make_folder(options.out)
     with counted(scenario.name, len(set(delays)), 0) as advance:
         rows = run_delays(
@@ -100,6 +98,10 @@ def _ticks(scenario: Scenario, milliseconds: float) -> int:
         raise WbmpcError(
             f"--delay {milliseconds:g}: not a multiple of the timestep, {1e3 * scenario.loop.timestep:g} ms"
         )
+    try:
+        at_delay(scenario, round(ticks))
+    except ScenarioError as error:
+        raise WbmpcError(f"--delay {milliseconds:g}: {KEY} {error.problems[0].message}") from None
     return round(ticks)
 
 

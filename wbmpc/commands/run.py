@@ -95,6 +95,10 @@ def make_folder(folder: Path) -> None:
 def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, Outcome], None, None]:
     """Index and outcome of every run, as they finish."""
     if len(jobs) == 1:
+        # Before it says that it runs: Ctrl-C in the middle of some compiled module's import ends Python by the signal,
+        # whatever exit code the command returns.
+        import wbmpc.session  # noqa: F401
+
         with simulated_time(jobs[0].name, jobs[0].scenario.duration) as on_progress:
             outcome = carry_out(jobs[0], on_progress)
         yield 0, outcome
