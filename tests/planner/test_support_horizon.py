@@ -27,7 +27,7 @@ def random_intervals(rng: np.random.Generator, *, level: bool) -> list[Interval]
     intervals, end = [], 0.0
     for _ in range(rng.integers(1, 7)):
         positions = np.column_stack(
-            [rng.uniform(-0.2, 0.2, 2), [0.06, -0.06] + rng.uniform(-0.03, 0.03, 2), np.zeros(2)]
+            [rng.uniform(-0.2, 0.2, 2), np.array([0.06, -0.06]) + rng.uniform(-0.03, 0.03, 2), np.zeros(2)]
         )
         if not level:
             positions[:, 2] = rng.uniform(0.0, 0.1, 2)

@@ -46,8 +46,8 @@ def horizon_polygons(
 
     Returns:
         Numbers of edges (K,), vertices (K, MAX_EDGES, 2), normals (K, MAX_EDGES, 2), offsets (K, MAX_EDGES),
-        centres (K, 2) and heights of the planes (K,), all as in `SupportPolygon`; shares (K, footsteps) of each footstep's
-        displacement by which the polygon moves.
+        centres (K, 2) and heights of the planes (K,), all as in `SupportPolygon`; shares (K, footsteps) of each
+        footstep's displacement by which the polygon moves.
     """
     K = len(which)
     counts = np.empty(K, np.int64)
