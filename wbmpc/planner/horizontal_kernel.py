@@ -165,9 +165,11 @@ def write_rows(
     com_band: Vector,
     footsteps: int,
     slots: Slots,
+    sides: int,
 ) -> None:
     """Rows of the ZMP (edge after edge of a knot), of the rest after the last knot, and of where the CoM may be.
 
+    `sides`: edges of the polygon that has most; every knot gets as many rows.
     Variables are jerks (x, then y), footsteps (the same) and the slots of ΔZ.
     """
     P_pu, P_vu = matrices.P_pu, matrices.P_vu
@@ -175,12 +177,12 @@ def write_rows(
     normals, offsets, shift, rest_normals, rest_offsets, rest_shift = edges
     n = len(normals)
     steps, first = 2 * n, 2 * n + 2 * footsteps
-    rest = n * MAX_EDGES
-    matrix[: rest + MAX_EDGES, first:] = 0.0
+    rest = n * sides
+    matrix[: rest + sides, first:] = 0.0
     tau = np.sqrt(end.b / end.a)
     for k in range(n):
-        for e in range(MAX_EDGES):
-            row = k * MAX_EDGES + e
+        for e in range(sides):
+            row = k * sides + e
             bound = offsets[k, e]
             for axis in range(2):
                 edge = normals[k, e, axis]
@@ -190,7 +192,7 @@ def write_rows(
                     matrix[row, steps + axis * footsteps + f] = -edge * shift[k, f]
                 bound -= edge * free_zmp[k, axis]
             upper[row] = bound
-    for e in range(MAX_EDGES):
+    for e in range(sides):
         bound = rest_offsets[e]
         for axis in range(2):
             edge = rest_normals[e, axis]
@@ -203,11 +205,11 @@ def write_rows(
     for i in range(len(slots.knots)):
         k = slots.knots[i]
         if k >= 0:
-            for e in range(MAX_EDGES):
-                matrix[k * MAX_EDGES + e, first + i] = normals[k, e, slots.axes[i]]
+            for e in range(sides):
+                matrix[k * sides + e, first + i] = normals[k, e, slots.axes[i]]
                 if k == n - 1:
                     matrix[rest + e, first + i] = rest_normals[e, slots.axes[i]]
-    band = rest + MAX_EDGES
+    band = rest + sides
     for axis in range(2):
         for k in range(n):
             lower[band + axis * n + k] = com_band[axis, k, 0] - free[axis, k]

@@ -27,6 +27,7 @@ from wbmpc.qp.solution import failed
 from wbmpc.signals import SolveStatus, Vector
 
 LARGEST_SHIFT = 1.0  # [m] bound on |ΔZ|
+SIDES = (4, 6, MAX_EDGES)  # of the polygons: problems of three sizes
 ROUNDS = 20  # of asking for further shifts; three are rare
 WORTH_TOLERANCE = 1e-4  # relative, of a shift's worth above its price: 1e-9 m of the shift
 KEPT_WORTH = 0.5  # of the price: shifts worth that may be asked for at the next plan are among its first guess
@@ -73,20 +74,25 @@ class HorizontalMotion:
         weights = (settings.velocity_cost, settings.position_cost, settings.zmp_centre_cost, settings.footstep_cost)
         self._costs = Costs(settings.jerk_cost, *weights, back)
         self._sizes = (0, n // 2, n, 2 * n) if ask_shift else (0,)
-        self._problems = {(m, size): self._problem(m, size) for m in (0, MAX_FOOTSTEPS) for size in self._sizes}
+        self._problems = {
+            (m, size, sides): self._problem(m, size, sides)
+            for m in (0, MAX_FOOTSTEPS)
+            for size in self._sizes
+            for sides in SIDES
+        }
         self._workspaces = {key: make_workspace(backend, problem) for key, problem in self._problems.items()}
         self._signs = np.zeros((n, 2))  # of the ΔZ that are variables, first guess for the next plan
 
-    def _problem(self, footsteps: int, slots: int) -> QuadraticProgram:
-        """A problem with what never changes in it."""
+    def _problem(self, footsteps: int, slots: int, sides: int) -> QuadraticProgram:
+        """A problem for polygons of at most so many sides, with what never changes in it."""
         n, settings, preview = self._preview.steps, self._settings, self._preview
-        soft = [settings.zmp_slack_cost] * (n * MAX_EDGES) + [settings.rest_slack_cost] * MAX_EDGES
+        soft = [settings.zmp_slack_cost] * (n * sides) + [settings.rest_slack_cost] * sides
         soft += [settings.reach_slack_cost] * (2 * n) + [settings.foot_slack_cost] * (2 * footsteps)
         first = 2 * n + 2 * footsteps
         qp = QuadraticProgram(first + slots, len(soft), soft_weight=soft)
         qp.hessian[first:, first:] = settings.delta_z_cost * np.eye(slots)
         for axis in range(2):
-            band = (n + 1) * MAX_EDGES + axis * n
+            band = (n + 1) * sides + axis * n
             qp.matrix[band : band + n, axis * n : (axis + 1) * n] = preview.P_pu
         return qp
 
@@ -114,6 +120,8 @@ class HorizontalMotion:
             *(support.normals, support.offsets, support.shift),
             *(support.rest_normals, support.rest_offsets, support.rest_shift),
         )
+        most = max(np.isfinite(support.offsets).sum(axis=1).max(), np.isfinite(support.rest_offsets).sum())
+        sides = next(size for size in SIDES if size >= most)
         price = settings.delta_z_price
         for _ in range(ROUNDS):
             asked, axes = np.nonzero(self._signs)
@@ -121,13 +129,14 @@ class HorizontalMotion:
             size = next(size for size in self._sizes if size >= count)
             slots = Slots(np.full(size, -1), np.zeros(size, dtype=np.int64))
             slots.knots[:count], slots.axes[:count] = asked, axes
-            qp = self._problems[m, size]
+            key = (m, size, sides)
+            qp = self._problems[key]
             write_costs(
                 *(qp.hessian, qp.gradient, self._costs, matrices, unmoved),
                 *(support.com_velocity, support.com_reference, support.centres, support.centring, support.shift),
                 *(m, urgency, first_curvature, first_gradient),
             )
-            write_rows(qp.matrix, qp.lower, qp.upper, matrices, unmoved, end, edges, com_band, m, slots)
+            write_rows(qp.matrix, qp.lower, qp.upper, matrices, unmoved, end, edges, com_band, m, slots, sides)
             if m:
                 self._footsteps(qp, support)
             if size:
@@ -137,7 +146,7 @@ class HorizontalMotion:
                 qp.gradient[first:] = price * sign
                 qp.x_lower[first:] = np.where(sign > 0.0, 0.0, -LARGEST_SHIFT)
                 qp.x_upper[first:] = np.where(sign < 0.0, 0.0, LARGEST_SHIFT)
-            solution = self._workspaces[m, size].solve()
+            solution = self._workspaces[key].solve()
             if solution.status != SolveStatus.SOLVED:
                 return None, solution
             steps = np.zeros((MAX_FOOTSTEPS, 2))
