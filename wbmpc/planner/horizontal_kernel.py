@@ -72,6 +72,15 @@ class Slots(NamedTuple):
 
 
 @kernel
+def most_sides(edges: HalfPlanes) -> int:
+    """How many sides the polygon with the most of them has; the rest of its rows are padding."""
+    most = len(edges.rest_offsets)
+    while most > 0 and np.isinf(edges.rest_offsets[most - 1]) and np.isinf(edges.offsets[:, most - 1]).all():
+        most -= 1
+    return most
+
+
+@kernel
 def free_motion(matrices: Matrices, state: Vector, a: Vector, b: Vector, offset: Vector) -> FreeMotion:
     """From `state` (2, 3) with the ZMP's model a, b (N,), `offset` (N, 2)."""
     P_ps, P_vs, P_pu, P_au = matrices.P_ps, matrices.P_vs, matrices.P_pu, matrices.P_au

@@ -13,6 +13,7 @@ from wbmpc.planner.horizontal_kernel import (
     Matrices,
     Slots,
     free_motion,
+    most_sides,
     motion_of,
     worth_of_shifts,
     write_costs,
@@ -28,6 +29,7 @@ from wbmpc.signals import SolveStatus, Vector
 
 LARGEST_SHIFT = 1.0  # [m] bound on |ΔZ|
 SIDES = (4, 6, MAX_EDGES)  # of the polygons: problems of three sizes
+NO_SLOTS = (Slots(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)), np.empty(0))
 ROUNDS = 20  # of asking for further shifts; three are rare
 WORTH_TOLERANCE = 1e-4  # relative, of a shift's worth above its price: 1e-9 m of the shift
 KEPT_WORTH = 0.5  # of the price: shifts worth that may be asked for at the next plan are among its first guess
@@ -120,15 +122,11 @@ class HorizontalMotion:
             *(support.normals, support.offsets, support.shift),
             *(support.rest_normals, support.rest_offsets, support.rest_shift),
         )
-        most = max(np.isfinite(support.offsets).sum(axis=1).max(), np.isfinite(support.rest_offsets).sum())
-        sides = next(size for size in SIDES if size >= most)
+        sides = next(size for size in SIDES if size >= most_sides(edges))
         price = settings.delta_z_price
         for _ in range(ROUNDS):
-            asked, axes = np.nonzero(self._signs)
-            count = len(asked)
-            size = next(size for size in self._sizes if size >= count)
-            slots = Slots(np.full(size, -1), np.zeros(size, dtype=np.int64))
-            slots.knots[:count], slots.axes[:count] = asked, axes
+            slots, sign = self._slots()
+            size = len(sign)
             key = (m, size, sides)
             qp = self._problems[key]
             write_costs(
@@ -140,8 +138,6 @@ class HorizontalMotion:
             if m:
                 self._footsteps(qp, support)
             if size:
-                sign = np.zeros(size)  # an unused slot is a variable on its own, which stays 0
-                sign[:count] = self._signs[asked, axes]
                 first = 2 * n + 2 * m
                 qp.gradient[first:] = price * sign
                 qp.x_lower[first:] = np.where(sign > 0.0, 0.0, -LARGEST_SHIFT)
@@ -164,7 +160,19 @@ class HorizontalMotion:
                 self._signs = np.where(np.abs(worth) > KEPT_WORTH * price, -np.sign(worth), 0.0)
                 return motion, solution
             self._signs[missing] = -np.sign(worth[missing])
+        self._signs[:] = 0.0
         return None, failed(qp, SolveStatus.ITERATION_LIMIT, ROUNDS, solution.solve_time)
+
+    def _slots(self) -> tuple[Slots, Vector]:
+        """The slots that hold the ΔZ asked for, and their signs; 0 of an unused one, a variable on its own."""
+        knots, axes = np.nonzero(self._signs)
+        count = len(knots)
+        if not count:
+            return NO_SLOTS
+        size = next(size for size in self._sizes if size >= count)
+        slots, sign = Slots(np.full(size, -1), np.zeros(size, dtype=np.int64)), np.zeros(size)
+        slots.knots[:count], slots.axes[:count], sign[:count] = knots, axes, self._signs[knots, axes]
+        return slots, sign
 
     def _footsteps(self, qp: QuadraticProgram, support: SupportPreview) -> None:
         """Where the coming footsteps may be: beside the one before, and within the swing foot's reach in time."""
