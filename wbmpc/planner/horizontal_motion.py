@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.support import MAX_EDGES
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
-from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
+from wbmpc.qp import QpSolution, QpWorkspace, QuadraticProgram, make_workspace
 from wbmpc.qp.solution import failed
 from wbmpc.signals import SolveStatus, Vector
 
@@ -76,13 +77,11 @@ class HorizontalMotion:
         weights = (settings.velocity_cost, settings.position_cost, settings.zmp_centre_cost, settings.footstep_cost)
         self._costs = Costs(settings.jerk_cost, *weights, back)
         self._sizes = (0, n // 2, n, 2 * n) if ask_shift else (0,)
-        self._problems = {
-            (m, size, sides): self._problem(m, size, sides)
-            for m in (0, MAX_FOOTSTEPS)
-            for size in self._sizes
-            for sides in SIDES
-        }
-        self._workspaces = {key: make_workspace(backend, problem) for key, problem in self._problems.items()}
+        self._problems: dict[tuple[int, int, int], QuadraticProgram] = {}
+        self._workspaces: dict[tuple[int, int, int], QpWorkspace] = {}
+        for key in product((0, MAX_FOOTSTEPS), self._sizes, SIDES):
+            self._problems[key] = self._problem(*key)
+            self._workspaces[key] = make_workspace(backend, self._problems[key])
         self._signs = np.zeros((n, 2))  # of the ΔZ that are variables, first guess for the next plan
 
     def _problem(self, footsteps: int, slots: int, sides: int) -> QuadraticProgram:
