@@ -39,10 +39,10 @@ TICK_PARTS = (
     ("physics and truth", Plant, "step"),
     ("recorder", Recorder, "append"),
 )
-QPS = {  # the QPs inside the stages, by tap (benchmarks/taps.py)
+QPS = {  # the QPs inside the stages, by tap, or by the class that made several (benchmarks/taps.py)
     "ComHeightStage 1": "  stage 1: QP",
-    "WholeBodyStage 1": "  stage 2: QP of the need",
-    "WholeBodyStage 2": "  stage 2: QP of the motion",
+    "HorizontalMotion": "  stage 2: QPs of the CoM",
+    "JointVelocities 1": "  stage 2: QP of the joints",
     "ContactChoice 1": "  stage 3: MIQP at firing",
     "ContactForce 1": "  stage 3: QP of the forces",
     "Tracker 1": "  tracker: QP",
@@ -81,8 +81,9 @@ def report_run(console: Console, name: str) -> None:
         ran = [r for plan in recorder.plans if (r := getattr(plan, stage)).status != SolveStatus.NOT_RUN]
         _row(table, f"stage {stage[-1]}", [report.solve_time for report in ran])
         for label, title in QPS.items():
-            if title.startswith(f"  stage {stage[-1]}") and label in taps:
-                _row(table, title, taps[label].seconds)
+            if title.startswith(f"  stage {stage[-1]}"):
+                solves = [s for tap in taps.values() if label in (tap.label, tap.maker) for s in tap.seconds]
+                _row(table, title, solves)
     console.print(table)
     ticks = len(recorder.command_solve_time)
     console.print(f"recording: {1e6 * (sum(parts[3]) + sum(flushes)) / ticks:.1f} µs a tick, flushes included")

@@ -31,10 +31,11 @@ class Moment:
     """Which problem to keep."""
 
     name: str  # of the file
-    tap: str  # see benchmarks/taps.py
+    tap: str  # see benchmarks/taps.py; without a number any of its class
     time: float  # [s]
     status: SolveStatus = SolveStatus.SOLVED
     run: str = "reach"  # of RUNS
+    variables: int = 0  # of the problem at least
 
 
 class _Enough(Exception):
@@ -55,10 +56,10 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {  # scenario, and what is changed
 MOMENTS = (
     Moment("stage1_start", "ComHeightStage 1", 0.0),
     Moment("stage1_lean", "ComHeightStage 1", 6.0),
-    Moment("stage2_need_start", "WholeBodyStage 1", 0.0),
-    Moment("stage2_need_lean", "WholeBodyStage 1", 8.5),  # ΔZ is not zero
-    Moment("stage2_execute_approach", "WholeBodyStage 2", 3.0),
-    Moment("stage2_execute_lean", "WholeBodyStage 2", 8.5),
+    Moment("stage2_com_start", "HorizontalMotion", 0.0),
+    Moment("stage2_com_lean", "HorizontalMotion", 8.5, variables=33),  # ΔZ is not zero
+    Moment("stage2_joints_approach", "JointVelocities 1", 3.0),
+    Moment("stage2_joints_lean", "JointVelocities 1", 8.5),
     Moment("stage3_choice", "ContactChoice 1", 0.0),  # the mixed-integer problem when a contact is needed
     Moment("stage3_hopeless", "ContactChoice 1", 0.0, SolveStatus.INFEASIBLE, run="weak_table"),  # no candidate helps
     Moment("stage3_two", "ContactChoice 1", 0.0, run="two_hands"),  # one contact is not enough
@@ -81,7 +82,8 @@ def record(run: str, out: Path) -> None:
     def keep(tap: Tap, solution: QpSolution) -> None:
         time = recorder.plans[-1].time if recorder.plans else 0.0
         for name, moment in list(left.items()):
-            if tap.label == moment.tap and time >= moment.time and solution.status is moment.status:
+            there = moment.tap in (tap.label, tap.maker) and tap.problem.variables >= moment.variables
+            if there and time >= moment.time and solution.status is moment.status:
                 save_instance(tap.problem, out / f"{name}.npz")
                 del left[name]
         if not left:

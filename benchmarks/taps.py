@@ -17,10 +17,15 @@ OnSolve = Callable[["Tap", QpSolution], None]
 class Tap:
     """A workspace that passes everything on to another and remembers how long each solve took."""
 
-    label: str  # class that made the workspace, and how many of its kind were made before: "WholeBodyStage 1"
+    label: str  # class that made the workspace, and how many it had made by then: "ContactChoice 1"
     inner: QpWorkspace
     on_solve: OnSolve | None
     seconds: list[float] = field(default_factory=list)
+
+    @property
+    def maker(self) -> str:
+        """The class that made the workspace."""
+        return self.label.split()[0]
 
     @property
     def problem(self) -> QuadraticProgram:

@@ -106,7 +106,7 @@ def test_nothing_is_asked_before_the_first_command() -> None:
     walker = stepping(walk((0.5, 0.1, 0.0, 0.0)))
     assert walker.next(feet_at(), 0.49) is None
     assert walker.command(0.49) is None
-    assert not walker.velocity(feet_at(), 0.49).any()
+    assert not walker.velocities(np.zeros(1), np.array([0.49])).any()
     assert walker.next(feet_at(), 0.5) is not None
 
 
@@ -116,8 +116,10 @@ def test_a_command_of_zero_from_standing_asks_for_no_step() -> None:
 
 @given(yaw=headings)
 def test_velocity_is_the_command_in_the_heading(yaw: float) -> None:
-    velocity = stepping(walk((0.0, 0.1, 0.05, 0.0))).velocity(feet_at(yaw=yaw), 1.0)
-    assert complex(*velocity) == pytest.approx(complex(0.1, 0.05) * np.exp(1j * yaw))
+    walker = stepping(walk((0.0, 0.1, 0.05, 0.0), (1.0, 0.0, 0.02, 0.0)))
+    velocities = walker.velocities(np.array([yaw, 2.0 * yaw]), np.array([0.9, 1.0]))
+    assert complex(*velocities[0]) == pytest.approx(complex(0.1, 0.05) * np.exp(1j * yaw))
+    assert complex(*velocities[1]) == pytest.approx(0.02j * np.exp(2j * yaw))
 
 
 def test_a_step_task_is_one_step() -> None:

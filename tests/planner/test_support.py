@@ -72,6 +72,24 @@ def test_shrunk_moves_every_edge_inwards(yaw: float, shift: float, margin: float
     assert_allclose(polygon.shrunk(margin).vertices, polygon.vertices)
 
 
+@given(yaw=st.floats(-1.0, 1.0), shift=st.floats(-0.1, 0.1), x=millimetres, y=millimetres)
+def test_nearest_is_the_nearest_point_of_the_shrunk_edges(yaw: float, shift: float, x: float, y: float) -> None:
+    polygon, point = two_feet(yaw, shift), np.array([x, y])
+    nearest = polygon.nearest(point)
+    if polygon.excess(point) <= 0.0:
+        assert_allclose(nearest, point, atol=1e-12)
+        return
+    edges = np.isfinite(polygon.offsets)
+    normals, offsets = polygon.normals[edges], polygon.offsets[edges]
+    ends = [np.linalg.solve(normals[[k - 1, k]], offsets[[k - 1, k]]) for k in range(len(offsets))]
+    distances = []
+    for start, end in zip(ends, [*ends[1:], ends[0]], strict=True):
+        along = np.clip((point - start) @ (end - start) / ((end - start) @ (end - start)), 0.0, 1.0)
+        distances.append(np.linalg.norm(start + along * (end - start) - point))
+    assert np.linalg.norm(nearest - point) == pytest.approx(min(distances), abs=2e-3)  # Dykstra's method stops early
+    assert polygon.excess(nearest) < 1e-3
+
+
 def test_padding_binds_nothing() -> None:
     polygon = SupportPolygon.of_corners(
         foot_corners(position=np.zeros(2), yaw=0.0, half_extents=HALF), margin=0.0, plane_height=0.0

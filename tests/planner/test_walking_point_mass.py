@@ -10,10 +10,12 @@ import pytest
 from gait_case import DT, PERIOD, SETTINGS, IdealGait, feet_at, walk
 from numpy.testing import assert_allclose
 
+from wbmpc.planner.horizontal_motion import ZmpModel
+from wbmpc.planner.joint_velocities import FOOT_ROWS, JointVelocities, VelocityTasks
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import GaitSettings, WholeBodySettings
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS
-from wbmpc.planner.whole_body import FOOT_ROWS, VelocityTasks, WholeBodyStage, ZmpModel
+from wbmpc.planner.whole_body import WholeBodyStage
 from wbmpc.signals import GRAVITY, Vector
 
 PREVIEW = Preview(steps=16, step=0.1)
@@ -53,7 +55,8 @@ def go(
     """Plan, execute the first jerk for one tick, plan again; `push`: time [s] and jump of the CoM velocity [m/s]."""
     gait_settings = gait.model_copy(update={"adapt_footsteps": adapt})
     run, out = IdealGait.of(walk(*commands), settings=gait_settings, feet=feet_at()), Walk()
-    stage = WholeBodyStage(PREVIEW, 1, STAGE_2, backend="daqp", ask_shift=False)
+    joints = JointVelocities(1, STAGE_2, backend="daqp")
+    stage = WholeBodyStage(PREVIEW, STAGE_2, joints, backend="daqp", ask_shift=False)
     state, shift = np.zeros((2, 3)), np.zeros((MAX_FOOTSTEPS, 2))
     band = np.tile([-np.inf, np.inf], (2, 16, 1))
     feet = run.gait.feet

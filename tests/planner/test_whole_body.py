@@ -29,9 +29,11 @@ from whole_body_case import (
 )
 
 from wbmpc.planner.bands import horizontal_band
+from wbmpc.planner.horizontal_motion import LARGEST_SHIFT, ZmpModel
+from wbmpc.planner.joint_velocities import FOOT_ROWS
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
-from wbmpc.planner.whole_body import FOOT_ROWS, LARGEST_SHIFT, HorizontalPlan, ZmpModel
+from wbmpc.planner.whole_body import HorizontalPlan
 from wbmpc.signals import GRAVITY, SolveStatus, Vector
 
 POLYGON = standing().polygons[0]

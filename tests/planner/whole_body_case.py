@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from robots import at, standing_polygon, surena
 
+from wbmpc.planner.horizontal_motion import ZmpModel
+from wbmpc.planner.joint_velocities import JointVelocities, VelocityTasks
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
-from wbmpc.planner.whole_body import HorizontalPlan, VelocityTasks, WholeBodyStage, ZmpModel
+from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage
 from wbmpc.signals import GRAVITY, Vector
 
 ROBOT = surena()
@@ -143,7 +145,8 @@ def _footsteps(rng: np.random.Generator) -> SupportPreview:
 
 
 def stage(*, ask_shift: bool, backend: str = "daqp") -> WholeBodyStage:
-    return WholeBodyStage(PREVIEW, ROBOT.nv, SETTINGS, backend=backend, ask_shift=ask_shift)
+    joints = JointVelocities(ROBOT.nv, SETTINGS, backend=backend)
+    return WholeBodyStage(PREVIEW, SETTINGS, joints, backend=backend, ask_shift=ask_shift)
 
 
 def arguments(problem: Problem) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.planner.settings import HeightSettings
 from wbmpc.signals import Vector
 
@@ -34,12 +35,22 @@ def horizontal_band(references: Vector, distance: Vector) -> Vector:
 
     Where two end-effectors disagree the band is the point between their bounds.
     """
-    places = references[:, :, :2]
-    if distance.ndim == 2:
-        distance = distance[:, None, :]
-    low = np.fmax.reduce(places - distance, axis=0).T  # (2, N)
-    high = np.fmin.reduce(places + distance, axis=0).T
-    crossed = low > high
-    if crossed.any():
-        low[crossed] = high[crossed] = 0.5 * (low + high)[crossed]
-    return np.stack([np.where(np.isnan(low), -np.inf, low), np.where(np.isnan(high), np.inf, high)], axis=2)
+    ends, n = references.shape[:2]
+    return _meet(references, np.broadcast_to(distance if distance.ndim == 3 else distance[:, None], (ends, n, 2)))
+
+
+@kernel
+def _meet(references: Vector, distance: Vector) -> Vector:
+    ends, n = references.shape[0], references.shape[1]
+    band = np.empty((2, n, 2))
+    for axis in range(2):
+        for k in range(n):
+            low, high = -np.inf, np.inf
+            for end in range(ends):
+                place = references[end, k, axis]
+                if not np.isnan(place):
+                    low, high = max(low, place - distance[end, k, axis]), min(high, place + distance[end, k, axis])
+            if low > high:
+                low = high = 0.5 * (low + high)
+            band[axis, k, 0], band[axis, k, 1] = low, high
+    return band

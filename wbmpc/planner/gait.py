@@ -11,7 +11,8 @@ from wbmpc.planner.footstep_bounds import FootstepBounds
 from wbmpc.planner.settings import GaitSettings
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.stride import Stride
-from wbmpc.planner.support import UNEVEN, SupportPolygon
+from wbmpc.planner.support import SupportPolygon
+from wbmpc.planner.support_horizon import NEVER, SupportHorizon
 from wbmpc.planner.support_interval import Interval, Transfer
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.swing import Swing
@@ -21,7 +22,6 @@ from wbmpc.signals import SIDES, Vector
 EARLY = 0.6  # share of the swing from which a touch counts as the landing
 SEARCH_TIME = 0.6  # [s] after which a foot that finds no ground is taken for landed
 LIFT_INSET = 0.005  # [m] of the pressure inside the sole that stays when a stride's foot lifts
-NEVER = 1e3  # [s]
 
 
 class SupportPhase(IntEnum):
@@ -44,6 +44,8 @@ class Gait:
         self.swing: Swing | None = None
         self._left = 0.0  # [s] until the phase ends
         self._late = 0.0  # [s] since the foot should have landed
+        self._made: dict[tuple[int, float], SupportPolygon] = {}  # polygons of the feet as they stand, by swing, margin
+        self._made_on = feet
 
     # ------------------------------------------------------------------ now
 
@@ -189,68 +191,16 @@ class Gait:
             com: (N, 3) where the CoM will be [m], roughly.
         """
         intervals, steps = self._intervals(time, float(times[-1]), rate)
-        n, m = len(times), MAX_FOOTSTEPS
-        shift = np.zeros((n, m))
-        com_reference, com_velocity = np.empty((n, 2)), np.empty((n, 2))
-        polygons: list[SupportPolygon] = []
-        centring = np.zeros(n)
-        made: dict[int, SupportPolygon] = {}  # of the intervals that have one for all their knots
-        plane = self._plane(intervals)
-        which = 0
-        for k, t in enumerate(times):
-            while which < len(intervals) - 1 and t > intervals[which].end + 1e-9:
-                which += 1
-            interval = intervals[which]
-            moving = interval.weights(t) is not None
-            if plane is not None:
-                view = (plane, com[k])
-                polygon = interval.polygon(t, half_extents=self._half_extents, margin=margin, onto=view)
-            elif moving or which not in made:
-                polygon = interval.polygon(t, half_extents=self._half_extents, margin=margin)
-                if not moving:
-                    made[which] = polygon
-            else:
-                polygon = made[which]
-            polygons.append(polygon.shrunk(growth * t))
-            shift[k] = interval.shares(t, m)
-            centring[k] = float(moving or interval.swing >= 0)
-            com_reference[k] = interval.feet.positions[:, :2].mean(axis=0)
-            com_velocity[k] = self._stepping.velocity(interval.feet, time + t)
-        last = intervals[which]
-        both = last if last.swing < 0 else intervals[min(which + 1, len(intervals) - 1)]
-        at_rest = Interval(NEVER, both.feet, -1, both.moved)
-        rest = at_rest.polygon(
-            0.0,
+        standing = [float(self.feet.positions[side, 2]) for side in range(2) if self.stance[side]]
+        horizon = SupportHorizon(intervals, times, standing=standing)
+        return horizon.preview(
             half_extents=self._half_extents,
-            margin=margin + growth * float(times[-1]),
-            onto=None if plane is None else (plane, com[-1]),
+            margin=margin,
+            growth=growth,
+            com=com,
+            com_velocity=self._stepping.velocities(horizon.headings, time + times),
+            bounds=FootstepBounds.of(self._settings, self.feet, steps, swing=self.swing, left=self._left),
         )
-        bounds = FootstepBounds.of(self._settings, self.feet, steps, swing=self.swing, left=self._left)
-        return SupportPreview(
-            normals=np.array([p.normals for p in polygons]),
-            offsets=np.array([p.offsets for p in polygons]),
-            shift=shift,
-            polygons=tuple(polygons),
-            centres=np.array([p.centre for p in polygons]),
-            centring=centring,
-            rest_normals=rest.normals,
-            rest_offsets=rest.offsets,
-            rest_shift=at_rest.shares(0.0, m),
-            footsteps=bounds.footsteps,
-            placement_axes=bounds.placement_axes,
-            placement_lower=bounds.placement_lower,
-            placement_upper=bounds.placement_upper,
-            lower=bounds.lower,
-            upper=bounds.upper,
-            com_reference=com_reference,
-            com_velocity=com_velocity,
-        )
-
-    def _plane(self, intervals: list[Interval]) -> float | None:
-        """Height of the plane of the feet that stand now [m] if all others are not as high; None on level ground."""
-        plane = float(np.mean([self.feet.positions[side][2] for side in range(2) if self.stance[side]]))
-        heights = np.array([interval.feet.positions[:, 2] for interval in intervals])
-        return plane if np.abs(heights - plane).max() > UNEVEN else None
 
     def goal_polygon(self, margin: float) -> SupportPolygon:
         """What carries the robot where its task ends: the stance foot when a foot is put somewhere, else both feet."""
@@ -262,8 +212,13 @@ class Gait:
 
     def _polygon_without(self, swing: int, margin: float) -> SupportPolygon:
         """Polygon of the feet but for the one at side `swing` (-1: of both), inset by `margin` [m]."""
-        interval = Interval(NEVER, self.feet, swing, (-1, -1))
-        return interval.polygon(0.0, half_extents=self._half_extents, margin=margin)
+        if self._made_on is not self.feet:
+            self._made_on, self._made = self.feet, {}
+        if (swing, margin) not in self._made:
+            interval = Interval(NEVER, self.feet, swing, (-1, -1))
+            polygon = interval.polygon(0.0, half_extents=self._half_extents, margin=margin)
+            self._made[swing, margin] = polygon
+        return self._made[swing, margin]
 
     def _intervals(self, time: float, horizon: float, rate: float) -> tuple[list[Interval], list[Footstep]]:
         """Phases until the horizon [s] and the footsteps made in them, at most MAX_FOOTSTEPS."""

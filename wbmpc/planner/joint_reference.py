@@ -6,8 +6,8 @@ import numpy as np
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.footstep import SoleReferences
+from wbmpc.planner.joint_velocities import VelocityTasks
 from wbmpc.planner.settings import WholeBodySettings
-from wbmpc.planner.whole_body import VelocityTasks
 from wbmpc.robot import Robot
 from wbmpc.rotations import angle_difference, cross, heading_of, level_frame, rotation_error
 from wbmpc.signals import SIDES, HandMode, Vector

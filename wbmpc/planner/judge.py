@@ -11,11 +11,11 @@ from wbmpc.planner.com_height import HeightPlan
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.gait import Gait
+from wbmpc.planner.horizontal_motion import Motion, ZmpModel
 from wbmpc.planner.references import References
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
-from wbmpc.planner.whole_body import HorizontalPlan, ZmpModel
 from wbmpc.planner.zmp_model import need_at_rest, need_of
 from wbmpc.signals import CandidateReport, StageReport, Vector
 
@@ -42,7 +42,7 @@ class Judge:
         self,
         time: float,
         times: Vector,
-        ask: Callable[[Vector], HorizontalPlan | None],
+        ask: Callable[[Vector], Motion | None],
         *,
         height: HeightPlan,
         model: ZmpModel,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from wbmpc.jit import kernel
 from wbmpc.scenario import Obstacle
 from wbmpc.signals import Vector
 
@@ -33,23 +35,8 @@ class KeepOut:
         the point, 0 … 1. A bar fits between three fixed points of a forearm; the nearest one it cannot pass. For a hand
         that is not `free` obstacles only mind the elbow's half of the forearm: the palm is to come near to one.
         """
-        points = palms[:, None] + SHARES[None, :, None] * (elbows - palms)[:, None]
-        points = points.reshape(-1, 3)
-        rows, distances = self.half_spaces(points)
-        reaching = np.repeat([not f for f in free], len(SHARES)) & (np.tile(SHARES, 2) < 0.5)
-        rows[reaching, 3], distances[reaching] = -np.inf, np.inf
-        away, clearance = _from_axes(points, leg_links)
-        clearance -= self._leg_radius
-        nearer = clearance < np.minimum(distances, NEAR)
-        rows[nearer, :3] = away[nearer]
-        rows[nearer, 3] = (np.einsum("ni,ni->n", away, points) - clearance + DISTANCE)[nearer]
-        distances = np.minimum(distances, clearance)
-        rows, distances = rows.reshape(2, len(SHARES), 4), distances.reshape(2, len(SHARES))
-        arms = np.empty((2, 3, 5))
-        for side in range(2):
-            chosen = (0, 1 + int(np.argmin(distances[side, 1:-1])), len(SHARES) - 1)
-            arms[side, :, :4], arms[side, :, 4] = rows[side, chosen], SHARES[list(chosen)]
-        return arms
+        boxes = (self._centres, self._halves, self._to_world)
+        return _of_arms(palms, elbows, leg_links, np.array(free), *boxes, self._leg_radius)
 
     def forearm_gap(self, palm: Vector, elbow: Vector) -> float:
         """Distance [m] from the surface of a forearm's elbow half to the nearest obstacle; palm and elbow (3,) [m]."""
@@ -62,31 +49,86 @@ class KeepOut:
         `points` (n, 3) in world [m]. Each row belongs to the obstacle nearest to its point; a is the direction away
         from it, for a point inside it the way out through the nearest face. b is -inf when no obstacle is near.
         """
-        rows = np.zeros((len(points), 4))
-        rows[:, 3] = -np.inf
-        if not len(self._centres):
-            return rows, np.full(len(points), np.inf)
-        inside = np.einsum("nki,kij->nkj", points[:, None] - self._centres, self._to_world)  # in each box
-        gaps = np.abs(inside) - self._halves
-        away = np.maximum(gaps, 0.0)
-        distances = np.sqrt(np.einsum("nki,nki->nk", away, away)) + np.minimum(gaps.max(axis=2), 0.0)
-        nearest = np.argmin(distances, axis=1)
-        for n, k in enumerate(nearest):
-            distance = distances[n, k]
+        return _half_spaces(points, self._centres, self._halves, self._to_world)
+
+
+@kernel
+def _of_arms(
+    palms: Vector,
+    elbows: Vector,
+    leg_links: Vector,
+    free: NDArray[np.bool_],
+    centres: Vector,
+    halves: Vector,
+    to_world: Vector,
+    leg_radius: float,
+) -> Vector:
+    arms, n = np.empty((2, 3, 5)), len(SHARES)
+    points = np.empty((n, 3))
+    for side in range(2):
+        for i in range(n):
+            points[i] = palms[side] + SHARES[i] * (elbows[side] - palms[side])
+        rows, distances = _half_spaces(points, centres, halves, to_world)
+        away, clearances = _from_axes(points, leg_links)
+        for i in range(n):
+            if not free[side] and SHARES[i] < 0.5:
+                rows[i, 3], distances[i] = -np.inf, np.inf
+            clearance = clearances[i] - leg_radius
+            if clearance < min(distances[i], NEAR):
+                rows[i, :3] = away[i]
+                rows[i, 3] = np.sum(away[i] * points[i]) - clearance + DISTANCE
+            distances[i] = min(distances[i], clearance)
+        chosen = np.array([0, 1 + np.argmin(distances[1:-1]), n - 1])
+        arms[side, :, :4], arms[side, :, 4] = rows[chosen], SHARES[chosen]
+    return arms
+
+
+@kernel
+def _half_spaces(points: Vector, centres: Vector, halves: Vector, to_world: Vector) -> tuple[Vector, Vector]:
+    rows, distances = np.zeros((len(points), 4)), np.full(len(points), np.inf)
+    rows[:, 3] = -np.inf
+    inside, direction = np.empty(3), np.empty(3)
+    for n in range(len(points)):
+        for k in range(len(centres)):
+            outside, gap = 0.0, -np.inf
+            for j in range(3):
+                inside[j] = 0.0  # the point in the box's own axes
+                for i in range(3):
+                    inside[j] += (points[n, i] - centres[k, i]) * to_world[k, i, j]
+                over = abs(inside[j]) - halves[k, j]
+                gap = max(gap, over)
+                outside += max(over, 0.0) ** 2
+            distance = np.sqrt(outside) + min(gap, 0.0)
+            if distance >= distances[n]:
+                continue
+            distances[n] = distance
             if distance > NEAR:
                 continue
-            direction = away[n, k] if distance > 0.0 else (gaps[n, k] == gaps[n, k].max()).astype(float)
-            direction = self._to_world[k] @ (direction * np.where(inside[n, k] < 0.0, -1.0, 1.0))
-            direction /= np.linalg.norm(direction)
-            rows[n, :3], rows[n, 3] = direction, direction @ points[n] - distance + DISTANCE
-        return rows, distances.min(axis=1)
+            direction[:] = 0.0
+            for j in range(3):
+                over = abs(inside[j]) - halves[k, j]
+                share = max(over, 0.0) if distance > 0.0 else (1.0 if over == gap else 0.0)
+                for i in range(3):
+                    direction[i] += to_world[k, i, j] * (-share if inside[j] < 0.0 else share)
+            length = np.sqrt(direction[0] ** 2 + direction[1] ** 2 + direction[2] ** 2)
+            rows[n, 3] = DISTANCE - distance
+            for i in range(3):
+                rows[n, i] = direction[i] / length
+                rows[n, 3] += rows[n, i] * points[n, i]
+    return rows, distances
 
 
+@kernel
 def _from_axes(points: Vector, links: Vector) -> tuple[Vector, Vector]:
     """Unit directions (n, 3) away from the nearest of the links' axes (k, 2, 3), and distances (n,) [m] to it."""
-    begin, along = links[:, 0], links[:, 1] - links[:, 0]
-    shares = np.einsum("nki,ki->nk", points[:, None] - begin, along) / np.einsum("ki,ki->k", along, along)
-    offsets = points[:, None] - begin - np.clip(shares, 0.0, 1.0)[:, :, None] * along
-    distances = np.sqrt(np.einsum("nki,nki->nk", offsets, offsets))
-    nearest = (np.arange(len(points)), np.argmin(distances, axis=1))
-    return offsets[nearest] / np.maximum(distances[nearest], 1e-9)[:, None], distances[nearest]
+    away, distances = np.zeros((len(points), 3)), np.full(len(points), np.inf)
+    for n in range(len(points)):
+        for k in range(len(links)):
+            along = links[k, 1] - links[k, 0]
+            offset = points[n] - links[k, 0]
+            offset -= min(max(np.sum(offset * along) / np.sum(along * along), 0.0), 1.0) * along
+            distance = np.sqrt(np.sum(offset * offset))
+            if distance < distances[n]:
+                distances[n] = distance
+                away[n] = offset / max(distance, 1e-9)
+    return away, distances

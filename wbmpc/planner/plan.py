@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.horizontal_motion import Motion
 from wbmpc.planner.plan_kernel import com_at, continue_plan
-from wbmpc.planner.whole_body import HorizontalPlan
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
 
@@ -103,7 +103,7 @@ class Plan:
         )
 
 
-def com_course(now: Vector, motion: HorizontalPlan | None, height: HeightPlan) -> tuple[Vector, Vector]:
+def com_course(now: Vector, motion: Motion | None, height: HeightPlan) -> tuple[Vector, Vector]:
     """CoM states (N + 1, 3 axes, 3) now and at every knot, and jerks (N, 3), of what stages 1 and 2 have planned.
 
     Args:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 
 import numpy as np
@@ -15,7 +16,9 @@ from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import Feet
 from wbmpc.planner.gait import Gait, SupportPhase
+from wbmpc.planner.horizontal_motion import ZmpModel
 from wbmpc.planner.joint_reference import JointReference
+from wbmpc.planner.joint_velocities import JointVelocities
 from wbmpc.planner.judge import Judge
 from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.plan import Plan, com_course
@@ -26,7 +29,7 @@ from wbmpc.planner.snapshot import Snapshot
 from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.tasks import Tasks
-from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage, ZmpModel
+from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage
 from wbmpc.planner.zmp_model import free_model, loaded_model
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
@@ -67,8 +70,9 @@ class Planner:
         self._keep_out = KeepOut(obstacles, forearm_radius=robot.forearm_radius, leg_radius=robot.leg_radius)
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
+        joints = JointVelocities(robot.nv, settings.whole_body, backend=settings.qp_backend)
         self._need_stage, self._motion_stage = (
-            WholeBodyStage(self._preview, robot.nv, settings.whole_body, backend=settings.qp_backend, ask_shift=ask)
+            WholeBodyStage(self._preview, settings.whole_body, joints, backend=settings.qp_backend, ask_shift=ask)
             for ask in (True, False)
         )
         measured = self._measured = Snapshot(robot, q)
@@ -138,8 +142,7 @@ class Planner:
             )
 
         carried = references.carried(preview.times)
-        exact = settings.formulation == "exact"
-        model = free_model(preview, height, plane=plane, mass=mass, exact=exact)
+        model = free_model(preview, height, plane=plane, mass=mass, exact=settings.formulation == "exact")
         if carried.any():
             model = loaded_model(preview, height, forces=carried, points=list(gated), plane=plane, mass=mass)
         judgement = self._judge.judge(
@@ -212,8 +215,8 @@ class Planner:
         if self._last is not None:
             self._elapsed = state.time - self._time
             planned = self._last.com_state(state.time)
-            plane = float(self._gait.feet.positions[:, 2].mean())
-            self._com.update(planned, measured=self._measured.com, height=float(planned[2, 0]) - plane)
+            height = float(planned[2, 0] - self._gait.feet.positions[:, 2].mean())
+            self._com.update(planned, measured=self._measured.com, height=height)
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
 
@@ -292,9 +295,6 @@ class Planner:
         settings, alarm, gait = self._settings.whole_body, self._com.alarm, self._gait
         margin = self._com.inset(walking=gait.walking)
         times, growth, com = self._preview.times, settings.zmp_margin_growth, self._course
-
-        def preview(rate: float, margin: float) -> SupportPreview:
-            return gait.preview(time, times, rate=rate, margin=margin, growth=growth, com=com)
-
-        judged = preview(1.0, settings.zmp_margin)
-        return judged, judged if self._gate >= 1.0 and not alarm else preview(self._gate, margin)
+        preview = partial(gait.preview, time, times, growth=growth, com=com)
+        judged = preview(rate=1.0, margin=settings.zmp_margin)
+        return judged, judged if self._gate >= 1.0 and not alarm else preview(rate=self._gate, margin=margin)

@@ -28,6 +28,9 @@ class Stepping:
             Journey(i, task, settings, footholds) for i, task in enumerate(tasks) if isinstance(task, GoTask)
         ]
         self._walks = [(i, task) for i, task in enumerate(tasks) if isinstance(task, WalkTask)]
+        commands = [command for _, walk in self._walks for command in walk.commands]
+        self._command_times = np.array([command.time for command in commands])  # [s]
+        self._commands = np.array([(*command.velocity, command.yaw_rate) for command in commands]).reshape(-1, 3)
         self._steps = [(i, task) for i, task in enumerate(tasks) if isinstance(task, StepTask)]
         self._done: set[int] = set()
 
@@ -38,12 +41,8 @@ class Stepping:
 
     def command(self, time: float) -> Vector | None:
         """Velocity command (forward, left, yaw rate) [m/s, rad/s]; None before the first one."""
-        current = None
-        for _, walk in self._walks:
-            for command in walk.commands:
-                if command.time <= time + 1e-9:
-                    current = np.array([*command.velocity, command.yaw_rate])
-        return current
+        given = np.flatnonzero(self._command_times <= time + 1e-9)
+        return self._commands[given[-1]] if given.size else None
 
     def next(self, feet: Feet, time: float, *, made: tuple[int, ...] = ()) -> Footstep | None:
         """The next step at `time` [s] from `feet`, None to stand; `made`: tasks of steps already previewed."""
@@ -60,10 +59,17 @@ class Stepping:
         """Whether `feet` that have no next step are not where they were to go."""
         return any(journey.task.start <= time and not journey.arrived(feet) for journey in self._journeys)
 
-    def velocity(self, feet: Feet, time: float) -> Vector:
-        """Wanted CoM velocity (2,) in world [m/s]."""
-        command = self.command(time)
-        return np.zeros(2) if command is None else plane_rotation(feet.heading) @ command[:2]
+    def velocities(self, headings: Vector, times: Vector) -> Vector:
+        """Wanted CoM velocities (n, 2) in world [m/s] at `times` (n,) [s] with the robot's `headings` (n,) [rad]."""
+        out = np.zeros((len(times), 2))
+        if not len(self._commands):
+            return out
+        given = self._command_times <= times[:, None] + 1e-9  # (n, commands); the last one counts
+        latest = given.shape[1] - 1 - np.argmax(given[:, ::-1], axis=1)
+        forward, left = self._commands[latest, :2].T * given.any(axis=1)
+        c, s = np.cos(headings), np.sin(headings)
+        out[:, 0], out[:, 1] = c * forward - s * left, s * forward + c * left
+        return out
 
     def _commanded(self, index: int, task: StepTask, feet: Feet) -> Footstep:
         side = ("left", "right").index(task.foot)

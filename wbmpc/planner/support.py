@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.signals import Vector
 
 PROJECTIONS = 20
@@ -85,15 +86,20 @@ class SupportPolygon:
 
     def nearest(self, point: Vector) -> Vector:
         """The point (2,) of the shrunk polygon nearest to `point` (2,) [m], by Dykstra's alternating projections."""
-        z = np.array(point[:2], dtype=np.float64)
-        correction = np.zeros_like(self.normals)
-        for _ in range(PROJECTIONS):
-            for i, (normal, offset) in enumerate(zip(self.normals, self.offsets, strict=True)):
-                before = z + correction[i]
-                z = before - max(float(normal @ before) - offset, 0.0) * normal
-                correction[i] = before - z
-        return z
+        return _nearest(self.normals, self.offsets, float(point[0]), float(point[1]))
 
     def excess(self, point: Vector) -> float:
         """How far `point` (2,) lies outside the shrunk polygon [m]; negative inside (largest edge violation)."""
         return float(np.max(self.normals @ point[:2] - self.offsets))
+
+
+@kernel
+def _nearest(normals: Vector, offsets: Vector, x: float, y: float) -> Vector:
+    z, correction = np.array([x, y]), np.zeros_like(normals)
+    for _ in range(PROJECTIONS):
+        for i in range(len(offsets)):
+            bx, by = z[0] + correction[i, 0], z[1] + correction[i, 1]
+            beyond = max(normals[i, 0] * bx + normals[i, 1] * by - offsets[i], 0.0)
+            z[0], z[1] = bx - beyond * normals[i, 0], by - beyond * normals[i, 1]
+            correction[i, 0], correction[i, 1] = bx - z[0], by - z[1]
+    return z

@@ -6,9 +6,9 @@ import numpy as np
 
 from wbmpc.planner.com_height import HeightPlan
 from wbmpc.planner.contact_force import Need
+from wbmpc.planner.horizontal_motion import Motion, ZmpModel
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.support import SupportPolygon
-from wbmpc.planner.whole_body import HorizontalPlan, ZmpModel
 from wbmpc.signals import GRAVITY, Vector
 
 
@@ -69,7 +69,7 @@ def need_at_rest(com: Vector, *, polygon: SupportPolygon, mass: float) -> Need:
 
 
 def need_of(
-    wish: HorizontalPlan,
+    wish: Motion,
     height: HeightPlan,
     model: ZmpModel,
     *,
