@@ -67,15 +67,13 @@ class ContactChoice:
         self, options: int, settings: ContactSettings, *, mass: float, backend: str, knots: int = KNOTS
     ) -> None:
         """For at most `options` options at a time and needs of `knots` knots; `backend` is a key of MIQP_BACKENDS."""
-        self._options, self._settings, self._mass, self._knots = options, settings, mass, knots
-        self._forces = 3 * self._knots * options
+        self._settings, self._mass, self._knots = settings, mass, knots
+        self._forces = 3 * knots * options
         self._knot_rows = 2 + MAX_EDGES
-        self._sums = (
-            self._knots * self._knot_rows + options * self._knots * 5
-        )  # first of: count, crossing, hands, patches
+        self._sums = knots * (self._knot_rows + 5 * options)  # first row of: count, crossing, hands, patches
         rows = self._sums + 2 + len(SIDES) + options // 2
         soft = np.zeros(rows)
-        for knot in range(self._knots):
+        for knot in range(knots):
             # the equality is in N m; the slack's price is per metre of shift
             soft[knot * self._knot_rows : knot * self._knot_rows + 2] = (
                 settings.shift_slack_cost / (mass * GRAVITY) ** 2
@@ -90,14 +88,29 @@ class ContactChoice:
         Args:
             left: (2,) unit vector to the robot's left.
         """
-        qp, forces, slots = self.problem, self._forces, self._options
+        self.pose(need, options, left=left)
+        solution, forces, knots = self._workspace.solve(), self._forces, self._knots
+        if solution.status != SolveStatus.SOLVED:
+            return Choice((), np.zeros((len(options), knots, 3)), np.inf, solution)
+        x = solution.x
+        taken = x[forces : forces + len(options)] > 0.5
+        return Choice(
+            winners=tuple(i for i, option in enumerate(options) if taken[i] and not option.held),
+            forces=x[:forces].reshape(-1, knots, 3)[: len(options)].copy(),
+            objective=self.problem.objective(x),
+            solution=solution,
+        )
+
+    def pose(self, need: Need, options: Sequence[Option], *, left: Vector) -> None:
+        """Write `problem`, as `solve` does before it solves."""
+        qp, forces = self.problem, self._forces
         qp.matrix[:] = 0.0
         qp.gradient[:] = 0.0
         qp.lower[:], qp.upper[:] = -np.inf, 0.0
         qp.x_lower[:forces], qp.x_upper[:forces] = -np.inf, np.inf
         qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
         # solvers want strict convexity; unused slots and binaries have no curvature of their own
-        qp.hessian[:] = 1e-6 * np.eye(forces + slots)
+        qp.hessian[:] = 1e-6 * np.eye(qp.variables)
         h, q = shift_bound(need), polygon_bound(need)
         for knot in range(self._knots):
             first = knot * self._knot_rows
@@ -109,17 +122,6 @@ class ContactChoice:
         qp.x_lower[unused:forces] = qp.x_upper[unused:forces] = 0.0
         qp.x_upper[forces + len(options) :] = 0.0
         self._fill_sums(options, left)
-        solution = self._workspace.solve()
-        if solution.status != SolveStatus.SOLVED:
-            return Choice((), np.zeros((len(options), self._knots, 3)), np.inf, solution)
-        x = solution.x
-        taken = x[forces : forces + len(options)] > 0.5
-        return Choice(
-            winners=tuple(i for i, option in enumerate(options) if taken[i] and not option.held),
-            forces=x[:forces].reshape(slots, self._knots, 3)[: len(options)].copy(),
-            objective=qp.objective(x),
-            solution=solution,
-        )
 
     def costs(
         self, need: Need, options: Sequence[Option], sets: Sequence[tuple[int, ...]], *, left: Vector

@@ -35,19 +35,17 @@ class SetTable(NamedTuple):
     alpha: Vector  # (knots, 2) [cost / m] the present cut
     beta: Vector  # (knots,) [cost]
     share: Vector  # (n,) [cost] of each option in the cut
+    price: Vector  # (n,) [cost] w_i, zero for what is held
 
-    @classmethod
-    def of_size(cls, options: int, knots: int) -> SetTable:
-        """Room for every option and every pair of a left and a right hand's."""
-        sets = options + options * options // 4
-        return cls(
-            first=np.zeros(sets, dtype=np.int64),
-            second=np.zeros(sets, dtype=np.int64),
-            bound=np.zeros(sets),
-            alpha=np.zeros((knots, 2)),
-            beta=np.zeros(knots),
-            share=np.zeros(options),
-        )
+
+@kernel
+def empty_table(options: int, knots: int) -> SetTable:
+    """Room for every option and every pair of a left and a right hand's."""
+    sets = options + options * options // 4
+    return SetTable(
+        np.zeros(sets, dtype=np.int64), np.zeros(sets, dtype=np.int64), np.zeros(sets),
+        np.zeros((knots, 2)), np.zeros(knots), np.zeros(options), np.zeros(options),
+    )  # fmt: skip
 
 
 @kernel
@@ -64,15 +62,15 @@ def collect_multipliers(table: SetTable, room: KnotRoom, need: KnotNeeds, k: int
 
 
 @kernel
-def cut_by_optimum(
-    table: SetTable, sets: int, constant: float, need: KnotNeeds, grips: Grips, prices: Vector, options: int
-) -> None:
+def cut_by_optimum(table: SetTable, sets: int, constant: float, need: KnotNeeds, grips: Grips) -> None:
     """Raise the bounds of all sets by the multipliers collected at every knot."""
-    for i in range(options):
-        table.share[i] = prices[i]
+    for i in range(len(table.share)):
+        table.share[i] = table.price[i]
         for k in range(len(need.height)):
             x, y, z = _gradient(table, need, k, grips, i)
-            table.share[i] += _least_cost(x, y, z, grips.price[0], grips.price[2], grips.slope[i], grips.cap[i])
+            table.share[i] += _least_cost(
+                x, y, z, grips.tangent_price, grips.normal_price, grips.slope[i], grips.cap[i]
+            )
     for s in range(sets):
         bound = constant + table.share[table.first[s]]
         if table.second[s] >= 0:
@@ -81,14 +79,12 @@ def cut_by_optimum(
 
 
 @kernel
-def cut_by_infeasibility(
-    table: SetTable, sets: int, room: KnotRoom, need: KnotNeeds, k: int, grips: Grips, options: int
-) -> None:
+def cut_by_infeasibility(table: SetTable, sets: int, room: KnotRoom, need: KnotNeeds, k: int, grips: Grips) -> None:
     """Dismiss all sets that the proof just found, of a set that cannot give the need at knot `k`, applies to."""
     table.alpha[k] = 0.0
     table.beta[k] = 0.0
     reach = _add_polygon(table, room.qp.multiplier, need, k)
-    for i in range(options):
+    for i in range(len(table.share)):
         x, y, z = _gradient(table, need, k, grips, i)
         table.share[i] = grips.cap[i] * min(z - grips.slope[i] * (abs(x) + abs(y)), 0.0)  # at a corner of the pyramid
     scale = 0.0

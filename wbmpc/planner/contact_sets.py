@@ -10,13 +10,33 @@ from numpy.typing import NDArray
 
 from wbmpc.jit import kernel
 from wbmpc.planner.contact_choice import CROSSING_GAP, KNOTS, Choice, Option
-from wbmpc.planner.contact_cuts import SetTable, collect_multipliers, cut_by_infeasibility, cut_by_optimum
+from wbmpc.planner.contact_cuts import (
+    SetTable,
+    collect_multipliers,
+    cut_by_infeasibility,
+    cut_by_optimum,
+    empty_table,
+)
 from wbmpc.planner.contact_force import Need
-from wbmpc.planner.knot_qp import Grips, KnotNeeds, KnotRoom, set_axes, solve_knot, to_world
+from wbmpc.planner.knot_qp import (
+    GRIP,
+    NEED,
+    empty_room,
+    is_finite,
+    pack_need,
+    pack_patch,
+    pack_prices,
+    solve_knot,
+    to_world,
+    unpack_grips,
+    unpack_need,
+)
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.qp import QpSolution
 from wbmpc.signals import GRAVITY, SolveStatus, Vector
 
+HAND, PATCH, PRICE, HELD = range(4)  # columns of an option's terms; prices are zero for what is held
+TERMS = 4
 TIE = 1e-10  # [cost] by which a set must promise to be better than the best
 CROSSING_TOLERANCE = 1e-9  # [m] rounding of the distance between two patches
 
@@ -31,30 +51,27 @@ class ContactSets:
 
     def __init__(self, options: int, settings: ContactSettings, *, mass: float, knots: int = KNOTS) -> None:
         """For at most `options` options and needs of `knots` knots; the first instance compiles the kernels."""
-        self._settings, self._mass, self._knots = settings, mass, knots
-        self._needs, self._grips = KnotNeeds.room_for(knots), Grips.room_for(options, settings)
-        self._room, self._table = KnotRoom.empty(), SetTable.of_size(options, knots)
-        self._prices, self._across = np.zeros(options), np.zeros(options)  # [cost], [m] to the left
-        self._hand, self._patch = np.zeros(options, dtype=np.int64), np.zeros(options, dtype=np.int64)
-        self._held = np.zeros(options, dtype=np.bool_)
-        self._forces, self._trial = np.zeros((2, knots, 3)), np.zeros((2, knots, 3))
-        self._choose(0)
-        self._cost([])
+        self._weight, self._prices, self._most = mass * GRAVITY, pack_prices(settings), settings.most_contacts
+        self._need, self._grips = np.zeros((knots, NEED)), np.zeros((options, GRIP))
+        self._terms = np.zeros((options, TERMS))
+        left = np.array([0.0, 1.0])
+        self._choose(0, left, np.zeros((0, knots, 3)))
+        self._cost(0, left, [])
 
     def solve(self, need: Need, options: Sequence[Option], *, left: Vector) -> Choice:
         """See `ContactChoice.solve`; `iterations` counts the sets whose QPs were solved."""
-        start, count = perf_counter(), len(options)
-        self._take_over(need, options, left)
-        forces, binaries = np.zeros((count, self._knots, 3)), np.zeros(count)
-        best, cost, solved = self._choose(count) if self._needs.finite() else (-1, np.nan, 0)
-        if best < 0:
+        start, count, knots = perf_counter(), len(options), len(self._need)
+        self._pack(need, options)
+        x = np.zeros((3 * knots + 1) * count)
+        forces = x[: 3 * knots * count].reshape(count, knots, 3)
+        *members, cost, solved = self._choose(count, left, forces)
+        if not cost < np.inf:
             status = SolveStatus.INFEASIBLE if cost == np.inf else SolveStatus.NUMERICAL_ERROR
-            x = np.full(forces.size + count, np.nan)
+            x = np.full(x.size, np.nan)
             return Choice((), forces, np.inf, QpSolution(x, status, solved, perf_counter() - start))
-        taken = [int(i) for i in (self._table.first[best], self._table.second[best]) if i >= 0]
-        forces[taken] = self._mass * GRAVITY * self._forces[: len(taken)]
-        binaries[taken] = 1.0
-        x = np.concatenate([forces.ravel(), binaries])
+        taken = [i for i in members if i >= 0]
+        for i in taken:
+            x[forces.size + i] = 1.0
         solution = QpSolution(x, SolveStatus.SOLVED, solved, perf_counter() - start)
         return Choice(tuple(i for i in taken if not options[i].held), forces, cost, solution)
 
@@ -62,101 +79,55 @@ class ContactSets:
         self, need: Need, options: Sequence[Option], sets: Sequence[tuple[int, ...]], *, left: Vector
     ) -> list[tuple[float, Vector]]:
         """See `ContactChoice.costs`."""
-        self._take_over(need, options, left)
-        if not self._needs.finite():
-            return [(np.inf, np.zeros((len(members), self._knots, 3))) for members in sets]
-        costs, forces = self._cost(sets)
-        forces *= self._mass * GRAVITY
+        self._pack(need, options)
+        costs, forces = self._cost(len(options), left, sets)
         return [(float(costs[s]), forces[s, : len(members)]) for s, members in enumerate(sets)]
 
-    def _take_over(self, need: Need, options: Sequence[Option], left: Vector) -> None:
-        """Copy the problem into the kernels' arrays."""
-        self._needs.fill(need, mass=self._mass)
-        self._grips.fill([option.patch for option in options], mass=self._mass)
+    def _pack(self, need: Need, options: Sequence[Option]) -> None:
+        """Write the question into the arrays that the kernels read."""
+        pack_need(need, self._need)
         numbers: dict[int, int] = {}
         for i, option in enumerate(options):
-            self._hand[i] = option.hand
-            self._held[i] = option.held
-            self._prices[i] = 0.0 if option.held else option.price
-            self._patch[i] = numbers.setdefault(id(option.patch), i)
-        np.dot(self._grips.position[:, :2], left, out=self._across)
+            patch, held = option.patch, option.held
+            pack_patch(patch, self._grips[i])
+            self._terms[i] = option.hand, numbers.setdefault(id(patch), i), 0.0 if held else option.price, held
 
-    def _choose(self, options: int) -> tuple[int, float, int]:
-        sets = list_sets(
-            self._table, self._hand, self._patch, self._across, self._held, self._prices,
-            options, self._settings.most_contacts,
-        )  # fmt: skip
-        return choose_set(
-            self._room, self._table, sets, self._needs, self._grips, self._prices, options, self._forces, self._trial
-        )
+    def _choose(self, options: int, left: Vector, forces: Vector) -> tuple[int, int, float, int]:
+        grips, terms = self._grips[:options], self._terms[:options]
+        return choose_set(self._need, grips, terms, left, self._prices, self._weight, self._most, forces)
 
-    def _cost(self, sets: Sequence[tuple[int, ...]]) -> tuple[Vector, Vector]:
-        members = np.full((len(sets), 2), -1)
+    def _cost(self, options: int, left: Vector, sets: Sequence[tuple[int, ...]]) -> tuple[Vector, Vector]:
+        grips, terms, members = self._grips[:options], self._terms[:options], np.full((len(sets), 2), -1)
         for s, given in enumerate(sets):
             members[s, : len(given)] = given
-        costs, forces = np.full(len(sets), np.inf), np.zeros((len(sets), 2, self._knots, 3))
-        cost_sets(
-            self._room, members, self._needs, self._grips, self._prices, self._hand, self._patch, self._across,
-            costs, forces,
-        )  # fmt: skip
+        costs, forces = np.full(len(sets), np.inf), np.zeros((len(sets), 2, len(self._need), 3))
+        cost_sets(self._need, grips, terms, left, self._prices, self._weight, members, costs, forces)
         return costs, forces
 
 
 @kernel
-def list_sets(
-    table: SetTable,
-    hand: NDArray[np.int64],
-    patch: NDArray[np.int64],
-    across: Vector,
-    held: NDArray[np.bool_],
-    prices: Vector,
-    options: int,
-    most: int,
-) -> int:
-    """Write the admissible sets and, as their bounds, their prices; how many there are."""
-    kept = 0
-    for i in range(options):
-        kept += held[i]
-    sets = 0
-    for i in range(options):
-        if kept - held[i] == 0:
-            table.first[sets], table.second[sets], table.bound[sets] = i, -1, prices[i]
-            sets += 1
-        for j in range(i + 1, options):
-            if most >= 2 and kept - held[i] - held[j] == 0 and _may_share(hand, patch, across, i, j):
-                table.first[sets], table.second[sets], table.bound[sets] = i, j, prices[i] + prices[j]
-                sets += 1
-    return sets
-
-
-@kernel
-def _may_share(hand: NDArray[np.int64], patch: NDArray[np.int64], across: Vector, i: int, j: int) -> bool:
-    """Whether two options are of different hands, on different patches, and arms would not cross."""
-    if hand[i] == hand[j] or patch[i] == patch[j]:
-        return False
-    gap = across[i] - across[j] if hand[i] < hand[j] else across[j] - across[i]  # the left hand's first
-    return gap >= CROSSING_GAP - CROSSING_TOLERANCE
-
-
-@kernel
 def choose_set(
-    room: KnotRoom,
-    table: SetTable,
-    sets: int,
-    need: KnotNeeds,
-    grips: Grips,
+    packed_need: Vector,
+    packed_grips: Vector,
+    terms: Vector,
+    left: Vector,
     prices: Vector,
-    options: int,
+    weight_of_robot: float,
+    most: int,
     forces: Vector,
-    trial: Vector,
-) -> tuple[int, float, int]:
-    """The cheapest set, its cost and how many were solved; -1 and inf when none gives the need, -1 and nan on failure.
+) -> tuple[int, int, float, int]:
+    """The cheapest set as one or two options (-1: none), its cost, and how many sets were solved.
 
-    Writes the `forces` (2, knots, 3) of its contacts, in world, in the force unit of `grips`.
+    No set and inf when none gives the need, no set and nan when a QP could not be solved. Writes the set's `forces`
+    (options, knots, 3) [N] in world over zeros.
     """
+    need, room = unpack_need(packed_need, weight_of_robot), empty_room()
+    if not is_finite(need):
+        return -1, -1, np.nan, 0
+    grips, table = unpack_grips(packed_grips, prices, weight_of_robot), empty_table(len(terms), len(packed_need))
+    sets = _list_sets(table, terms, grips.position, left, most)
+    trial, best_forces = np.zeros((2, len(packed_need), 3)), np.zeros((2, len(packed_need), 3))
     best, best_cost, solved = -1, np.inf, 0
-    for i in range(options):
-        set_axes(grips.axes[i])
     while True:
         lowest = -1
         limit = best_cost - TIE
@@ -164,63 +135,104 @@ def choose_set(
             if table.bound[s] < limit:
                 lowest, limit = s, table.bound[s]
         if lowest < 0:
-            return best, best_cost, solved
+            break
         solved += 1
         table.bound[lowest] = np.inf
         i, j = table.first[lowest], table.second[lowest]
-        cost = prices[i] + (prices[j] if j >= 0 else 0.0)
+        cost = table.price[i] + (table.price[j] if j >= 0 else 0.0)
         constant = 0.0
-        for k in range(len(need.height)):
-            value = solve_knot(room, need, k, grips, i, j, grips.cap, 0.0)
-            if not value < np.inf:
-                cost = value
+        for k in range(len(packed_need)):
+            value = solve_knot(room, need, k, grips, i, j, 0.0)
+            if np.isnan(value):
+                return -1, -1, np.nan, solved
+            if value == np.inf:
+                cost = np.inf
+                cut_by_infeasibility(table, sets, room, need, k, grips)
                 break
             cost += value
             constant += collect_multipliers(table, room, need, k, grips.slack_price)
-            to_world(trial[0, k], room.qp.x[:3], grips.axes[i])
+            to_world(trial[0, k], room.qp.x[:3], grips.axes[i], weight_of_robot)
             if j >= 0:
-                to_world(trial[1, k], room.qp.x[3:], grips.axes[j])
-        if np.isnan(cost):
-            return -1, np.nan, solved
-        if cost == np.inf:
-            cut_by_infeasibility(table, sets, room, need, k, grips, options)
-            continue
-        cut_by_optimum(table, sets, constant, need, grips, prices, options)
+                to_world(trial[1, k], room.qp.x[3:], grips.axes[j], weight_of_robot)
+        if cost < np.inf:
+            cut_by_optimum(table, sets, constant, need, grips)
         if cost < best_cost:
             best, best_cost = lowest, cost
-            forces[:] = trial
+            best_forces[:] = trial
+    if best < 0:
+        return -1, -1, np.inf, solved
+    i, j = table.first[best], table.second[best]
+    forces[i] = best_forces[0]
+    if j >= 0:
+        forces[j] = best_forces[1]
+    return i, j, best_cost, solved
+
+
+@kernel
+def _list_sets(table: SetTable, terms: Vector, position: Vector, left: Vector, most: int) -> int:
+    """Write the admissible sets and, as their bounds, their prices; how many there are."""
+    options, kept, sets = len(terms), 0.0, 0
+    for i in range(options):
+        table.price[i] = terms[i, PRICE]
+        kept += terms[i, HELD]
+    for i in range(options):
+        if kept == terms[i, HELD]:
+            table.first[sets], table.second[sets], table.bound[sets] = i, -1, table.price[i]
+            sets += 1
+        for j in range(i + 1, options):
+            all_held = kept == terms[i, HELD] + terms[j, HELD]
+            if most >= 2 and all_held and _may_share(terms, position, left, i, j):
+                table.first[sets], table.second[sets] = i, j
+                table.bound[sets] = table.price[i] + table.price[j]
+                sets += 1
+    return sets
+
+
+@kernel
+def _may_share(terms: Vector, position: Vector, left: Vector, i: int, j: int) -> bool:
+    """Whether two options are of different hands, on different patches, and arms would not cross."""
+    if terms[i, HAND] == terms[j, HAND] or terms[i, PATCH] == terms[j, PATCH]:
+        return False
+    gap = 0.0  # from j's patch to i's, to the left
+    for axis in range(2):
+        gap += (position[i, axis] - position[j, axis]) * left[axis]
+    if terms[i, HAND] > terms[j, HAND]:  # the left hand is the first
+        gap = -gap
+    return gap >= CROSSING_GAP - CROSSING_TOLERANCE
 
 
 @kernel
 def cost_sets(
-    room: KnotRoom,
-    members: NDArray[np.int64],
-    need: KnotNeeds,
-    grips: Grips,
+    packed_need: Vector,
+    packed_grips: Vector,
+    terms: Vector,
+    left: Vector,
     prices: Vector,
-    hand: NDArray[np.int64],
-    patch: NDArray[np.int64],
-    across: Vector,
+    weight_of_robot: float,
+    members: NDArray[np.int64],
     costs: Vector,
     forces: Vector,
 ) -> None:
-    """Costs (s,) and forces (s, 2, knots, 3) of given sets `members` (s, 2), the second -1 where there is none.
+    """Costs (s,) and forces (s, 2, knots, 3) [N] of given sets `members` (s, 2), the second -1 where there is none.
 
-    A set that is not admissible or cannot give the need costs inf.
+    A set that is not admissible or cannot give the need keeps the cost that it has.
     """
-    for i in range(len(hand)):
-        set_axes(grips.axes[i])
+    need, room = unpack_need(packed_need, weight_of_robot), empty_room()
+    grips = unpack_grips(packed_grips, prices, weight_of_robot)
+    if not is_finite(need):
+        return
     for s in range(len(members)):
         i, j = members[s]
-        if j >= 0 and not _may_share(hand, patch, across, i, j):
+        if j >= 0 and not _may_share(terms, grips.position, left, i, j):
             continue
-        cost = prices[i] + (prices[j] if j >= 0 else 0.0)
-        for k in range(len(need.height)):
-            value = solve_knot(room, need, k, grips, i, j, grips.cap, 0.0)
-            cost = cost + value if value < np.inf else np.inf
-            if cost == np.inf:
+        cost = terms[i, PRICE] + (terms[j, PRICE] if j >= 0 else 0.0)
+        for k in range(len(packed_need)):
+            value = solve_knot(room, need, k, grips, i, j, 0.0)
+            if not value < np.inf:
                 break
-            to_world(forces[s, 0, k], room.qp.x[:3], grips.axes[i])
+            cost += value
+            to_world(forces[s, 0, k], room.qp.x[:3], grips.axes[i], weight_of_robot)
             if j >= 0:
-                to_world(forces[s, 1, k], room.qp.x[3:], grips.axes[j])
-        costs[s] = cost
+                to_world(forces[s, 1, k], room.qp.x[3:], grips.axes[j], weight_of_robot)
+        else:
+            costs[s] = cost

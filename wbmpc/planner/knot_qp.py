@@ -7,7 +7,6 @@ the knots of stage 3 share nothing: the shift equalities and the polygon rows co
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,12 +15,15 @@ from wbmpc.jit import kernel
 from wbmpc.planner.contact_force import PADDING, Need
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import MAX_EDGES
-from wbmpc.qp.small_qp import INFEASIBLE, SmallQp, solve_small
+from wbmpc.qp.small_qp import INFEASIBLE, SmallQp, room_for, solve_small
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import GRAVITY, Vector
+from wbmpc.signals import Vector
 
-SQRT2 = float(np.sqrt(2.0))
 CONE = 4  # sides of the linearised friction cone
+
+
+NEED = 8 + 3 * MAX_EDGES  # numbers of one packed knot
+GRIP = 8  # numbers of one packed contact
 
 
 class KnotNeeds(NamedTuple):
@@ -34,68 +36,17 @@ class KnotNeeds(NamedTuple):
     offsets: Vector  # (n, MAX_EDGES) [m]
     room: Vector  # (n, MAX_EDGES) [m] q of the polygon rows P f ≤ q
 
-    @classmethod
-    def room_for(cls, knots: int) -> KnotNeeds:
-        """Arrays for so many knots, no need at all."""
-        return cls(
-            centre=np.zeros((knots, 2)),
-            moment=np.zeros((knots, 2)),
-            height=np.zeros(knots),
-            normals=np.zeros((knots, MAX_EDGES, 2)),
-            offsets=np.zeros((knots, MAX_EDGES)),
-            room=np.zeros((knots, MAX_EDGES)),
-        )
-
-    def fill(self, need: Need, *, mass: float) -> None:
-        """Take over `need`, of as many knots, of a robot of `mass` [kg]."""
-        unit = 1.0 / (mass * GRAVITY)
-        for k, polygon in enumerate(need.polygons):
-            self.normals[k] = polygon.normals
-            self.offsets[k] = polygon.offsets
-            self.height[k] = polygon.plane_height
-        self.offsets[self.offsets == np.inf] = PADDING
-        weight, phantom = (unit * need.weight)[:, None], unit * need.phantom
-        np.add(need.zmp, need.delta_z, out=self.centre)
-        np.subtract(weight * need.delta_z, phantom, out=self.moment)
-        pressure = weight * need.zmp + phantom
-        np.subtract(weight * self.offsets, (self.normals @ pressure[:, :, None])[:, :, 0], out=self.room)
-
-    def finite(self) -> bool:
-        """Whether a QP can be made of it."""
-        return bool(np.isfinite(self.moment).all() and np.isfinite(self.centre).all() and np.isfinite(self.room).all())
-
 
 class Grips(NamedTuple):
-    """Up to n contacts as the kernels read them, and the prices of stage 3."""
+    """n contacts as the kernels read them, and the prices of stage 3."""
 
     position: Vector  # (n, 3) [m] in world
     axes: Vector  # (n, 3, 3) two tangents and the normal, as rows, in world
     slope: Vector  # (n,) largest |tangent| / normal, of each tangent
     cap: Vector  # (n,) largest normal force [m g]
-    price: Vector  # (3,) [cost / (m g)²] of the force's coordinates
+    tangent_price: float  # [cost / (m g)²] of each tangential part
+    normal_price: float  # [cost / (m g)²] of the normal part
     slack_price: float  # [cost / m²] of a shift that is not given
-
-    @classmethod
-    def room_for(cls, count: int, settings: ContactSettings) -> Grips:
-        """Arrays for `count` contacts."""
-        return cls(
-            position=np.zeros((count, 3)),
-            axes=np.zeros((count, 3, 3)),
-            slope=np.zeros(count),
-            cap=np.zeros(count),
-            price=np.array([settings.tangent_cost, settings.tangent_cost, settings.force_cost]),
-            slack_price=settings.shift_slack_cost,
-        )
-
-    def fill(self, patches: Sequence[PatchPose | None], *, mass: float) -> None:
-        """Take over the first contacts' `patches`, None for a place that is not used."""
-        unit = 1.0 / (mass * GRAVITY)
-        for i, patch in enumerate(patches):
-            if patch is not None:
-                self.position[i] = patch.position
-                self.axes[i, 2] = patch.normal
-                self.slope[i] = patch.friction / SQRT2  # the cone of `contact_force.cone_rows`
-                self.cap[i] = unit * patch.force_cap
 
 
 class KnotRoom(NamedTuple):
@@ -105,10 +56,91 @@ class KnotRoom(NamedTuple):
     shift: Vector  # (2, 6) G
     pull: Vector  # (2,) [cost / m] multipliers of the shift equalities: slack price × (G f − h)
 
-    @classmethod
-    def empty(cls) -> KnotRoom:
-        """All zero."""
-        return cls(SmallQp.of_size(6, MAX_EDGES + 2 * (CONE + 1)), np.zeros((2, 6)), np.zeros(2))
+
+def pack_need(need: Need, packed: Vector) -> None:
+    """Write `need` into `packed` (n, NEED), the form in which it is handed to a kernel."""
+    packed[:, 0:2] = need.delta_z
+    packed[:, 2:4] = need.zmp
+    packed[:, 4] = need.weight
+    packed[:, 5:7] = need.phantom
+    for row, polygon in zip(packed, need.polygons, strict=True):
+        row[7] = polygon.plane_height
+        row[8 : 8 + MAX_EDGES] = polygon.offsets
+        row[8 + MAX_EDGES :] = polygon.normals.ravel()
+
+
+def pack_patch(patch: PatchPose, packed: Vector) -> None:
+    """Write a contact on `patch` into `packed` (GRIP,)."""
+    packed[0:3] = patch.position
+    packed[3:6] = patch.normal
+    packed[6] = patch.friction
+    packed[7] = patch.force_cap
+
+
+def pack_prices(settings: ContactSettings) -> Vector:
+    """(3,) prices of tangential force, of normal force and of shift that is not given."""
+    return np.array([settings.tangent_cost, settings.force_cost, settings.shift_slack_cost])
+
+
+@kernel
+def empty_room() -> KnotRoom:
+    """All zero."""
+    return KnotRoom(room_for(6, MAX_EDGES + 2 * (CONE + 1)), np.zeros((2, 6)), np.zeros(2))
+
+
+@kernel
+def unpack_need(packed: Vector, weight_of_robot: float) -> KnotNeeds:
+    """The need that `pack_need` wrote, of a robot of that weight m g [N]."""
+    n = len(packed)
+    need = KnotNeeds(
+        np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n),
+        np.zeros((n, MAX_EDGES, 2)), np.zeros((n, MAX_EDGES)), np.zeros((n, MAX_EDGES)),
+    )  # fmt: skip
+    for k in range(n):
+        row = packed[k]
+        weight = row[4] / weight_of_robot
+        need.height[k] = row[7]
+        for axis in range(2):
+            need.centre[k, axis] = row[2 + axis] + row[axis]
+            need.moment[k, axis] = weight * row[axis] - row[5 + axis] / weight_of_robot
+        for e in range(MAX_EDGES):
+            offset = row[8 + e] if row[8 + e] < np.inf else PADDING
+            room = weight * offset
+            for axis in range(2):
+                normal = row[8 + MAX_EDGES + 2 * e + axis]
+                need.normals[k, e, axis] = normal
+                room -= normal * (weight * row[2 + axis] + row[5 + axis] / weight_of_robot)
+            need.offsets[k, e] = offset
+            need.room[k, e] = room
+    return need
+
+
+@kernel
+def is_finite(need: KnotNeeds) -> bool:
+    """Whether a QP can be made of it."""
+    total = 0.0  # finite − finite = 0; anything else is nan
+    for value in need.centre.flat:
+        total += value - value
+    for value in need.moment.flat:
+        total += value - value
+    for value in need.room.flat:
+        total += value - value
+    return total == 0.0
+
+
+@kernel
+def unpack_grips(packed: Vector, prices: Vector, weight_of_robot: float) -> Grips:
+    """The contacts that `pack_patch` wrote; the cone is that of `contact_force.cone_rows`."""
+    n = len(packed)
+    grips = Grips(np.zeros((n, 3)), np.zeros((n, 3, 3)), np.zeros(n), np.zeros(n), prices[0], prices[1], prices[2])
+    for i in range(n):
+        for j in range(3):
+            grips.position[i, j] = packed[i, j]
+            grips.axes[i, 2, j] = packed[i, 3 + j]
+        grips.slope[i] = packed[i, 6] / np.sqrt(2.0)
+        grips.cap[i] = packed[i, 7] / weight_of_robot
+        set_axes(grips.axes[i])
+    return grips
 
 
 @kernel
@@ -134,9 +166,9 @@ def _cross(a: Vector, b: Vector, out: Vector) -> None:
 
 @kernel
 def solve_knot(
-    room: KnotRoom, need: KnotNeeds, k: int, grips: Grips, first: int, second: int, caps: Vector, softness: float
+    room: KnotRoom, need: KnotNeeds, k: int, grips: Grips, first: int, second: int, softness: float
 ) -> float:
-    """Cost of knot `k` with contact `first`, and `second` unless it is negative, under `caps` (n,) [m g].
+    """Cost of knot `k` with contact `first`, and `second` unless it is negative.
 
     inf when no forces keep the feet's ZMP in its polygon (never when `softness` > 0: 1 / price of a polygon row), nan
     when the QP could not be solved. The forces are in `room.qp.x`; the polygon rows' multipliers lead
@@ -153,7 +185,7 @@ def solve_knot(
     for j in range(0, n, 3):
         i = first if j == 0 else second
         _write_contact(qp, shift, need, k, grips, i, j)
-        qp.bound[MAX_EDGES + (CONE + 1) * (j // 3) + CONE] = caps[i]
+        qp.bound[MAX_EDGES + (CONE + 1) * (j // 3) + CONE] = grips.cap[i]
     constant = 0.0
     for axis in range(2):
         constant += 0.5 * w * need.moment[k, axis] ** 2
@@ -161,7 +193,7 @@ def solve_knot(
         qp.gradient[i] = -w * (shift[0, i] * need.moment[k, 0] + shift[1, i] * need.moment[k, 1])
         for j in range(i + 1):
             qp.hessian[i, j] = w * (shift[0, i] * shift[0, j] + shift[1, i] * shift[1, j])
-        qp.hessian[i, i] += grips.price[i % 3]
+        qp.hessian[i, i] += grips.normal_price if i % 3 == 2 else grips.tangent_price
     steps = solve_small(qp, n, rows)
     if steps < 0:
         return np.inf if steps == INFEASIBLE else np.nan
@@ -175,7 +207,8 @@ def solve_knot(
         product = 0.0
         for axis in range(2):
             product += shift[axis, i] * (room.pull[axis] - w * need.moment[k, axis])
-        cost += 0.5 * qp.x[i] * (grips.price[i % 3] * qp.x[i] + product)
+        price = grips.normal_price if i % 3 == 2 else grips.tangent_price
+        cost += 0.5 * qp.x[i] * (price * qp.x[i] + product)
     return cost
 
 
@@ -200,7 +233,7 @@ def _write_contact(qp: SmallQp, shift: Vector, need: KnotNeeds, k: int, grips: G
 
 
 @kernel
-def to_world(forces: Vector, coordinates: Vector, axes: Vector) -> None:
-    """Write a force's three leading `coordinates` in the frame `axes` (3, 3) as `forces` (3,) in world."""
+def to_world(forces: Vector, coordinates: Vector, axes: Vector, unit: float) -> None:
+    """Write a force's three leading `coordinates` in the frame `axes` (3, 3) as `forces` (3,) in world, × `unit`."""
     for j in range(3):
-        forces[j] = coordinates[0] * axes[0, j] + coordinates[1] * axes[1, j] + coordinates[2] * axes[2, j]
+        forces[j] = unit * (coordinates[0] * axes[0, j] + coordinates[1] * axes[1, j] + coordinates[2] * axes[2, j])

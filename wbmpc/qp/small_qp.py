@@ -1,4 +1,4 @@
-"""A dual active-set method for strictly convex QPs of a few variables, as one kernel: no allocation, no interpreter.
+"""A dual active-set method for strictly convex QPs of a few variables, as one kernel.
 
 minimise ½ xᵀ H x + gᵀ x + ½ Σ_i s_i² / d_i   subject to  A x ≤ b + s,   s_i = 0 for a hard row (d_i = 0)
 
@@ -50,19 +50,16 @@ class SmallQp(NamedTuple):
     lower: Vector  # (m,) on the way there
     active: NDArray[np.int64]  # (m,) the active rows, in the order in which they came
 
-    @classmethod
-    def of_size(cls, variables: int, rows: int) -> SmallQp:
-        """Arrays for up to so many variables and rows, all zero."""
-        n, m = variables, rows
-        square, vector, matrix = np.zeros((n, n)), np.zeros(n), np.zeros((m, n))
-        one = np.zeros(m)
-        return cls(
-            hessian=square, gradient=vector, rows=matrix, bound=one, softness=one.copy(),
-            x=vector.copy(), multiplier=one.copy(), factor=square.copy(), y=vector.copy(), unit=matrix.copy(),
-            scale=one.copy(), limit=one.copy(), yielding=one.copy(), weight=one.copy(), gram=np.zeros((m, m)),
-            ratio=one.copy(), rest=vector.copy(), change=one.copy(), lower=one.copy(),
-            active=np.zeros(m, dtype=np.int64),
-        )  # fmt: skip
+
+@kernel
+def room_for(variables: int, rows: int) -> SmallQp:
+    """Arrays for up to so many variables and rows, all zero. Made in a kernel: cheaper than to hand 20 of them over."""
+    n, m = variables, rows
+    return SmallQp(
+        np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m), np.zeros(m), np.zeros(n), np.zeros(m),
+        np.zeros((n, n)), np.zeros(n), np.zeros((m, n)), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m),
+        np.zeros((m, m)), np.zeros(m), np.zeros(n), np.zeros(m), np.zeros(m), np.zeros(m, dtype=np.int64),
+    )  # fmt: skip
 
 
 @kernel
