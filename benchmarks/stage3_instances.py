@@ -12,7 +12,7 @@ from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.qp import QuadraticProgram
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import GRAVITY, SIDES
+from wbmpc.signals import GRAVITY, SIDES, Vector
 
 MASS = 3.43  # [kg] of SURENA-MINI
 SETTINGS = ContactSettings()
@@ -53,21 +53,24 @@ def ask(seed: int, *, options: int, knots: int) -> Question:
         for hand in range(len(SIDES)):
             palm = np.array([0.02, 0.12 if hand == 0 else -0.12, 0.16])
             given.append(Option(patch, hand, SETTINGS.distance_cost * float(np.linalg.norm(position - palm))))
-    return Question(_lean(rng, knots), given[:options])
-
-
-def _lean(rng: np.random.Generator, knots: int) -> Need:
-    """At rest at first, then drifting: the ZMP without contact and the shift that brings it back into the polygon."""
-    front = float(POLYGON.offsets[np.argmax(POLYGON.normals[:, 0])])
     start, drift, sideways = rng.uniform(0.010, 0.025), rng.uniform(0.0, 0.015), rng.uniform(-0.03, 0.03)
+    lift = rng.uniform(-0.3, 0.3, knots)
+    return Question(lean(start, drift=drift, sideways=sideways, knots=knots, lift=lift), given[:options])
+
+
+def lean(start: float, *, drift: float, sideways: float, knots: int, lift: Vector | float = 0.0) -> Need:
+    """The ZMP without contact, `start` [m] beyond the feet and drifting on and to the side, and the shift back into them.
+
+    `lift` is c̈_z [m/s²] at every knot.
+    """
+    front = float(POLYGON.offsets[np.argmax(POLYGON.normals[:, 0])])
     share = np.linspace(0.0, 1.0, knots)
     zmp = np.column_stack([front + start + drift * share, sideways * share])
-    lift = rng.uniform(-0.3, 0.3, knots)  # [m/s²] c̈_z
     wanted = np.array([POLYGON.nearest(point) for point in zmp])
     return Need(
         delta_z=wanted - zmp,
         zmp=zmp,
-        weight=MASS * (GRAVITY + lift),
+        weight=MASS * (GRAVITY + lift) * np.ones(knots),
         polygons=(POLYGON,) * knots,
         phantom=np.zeros((knots, 2)),
     )

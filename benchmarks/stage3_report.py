@@ -19,13 +19,24 @@ def table(meeting: Meeting, sizes: list[Size]) -> list[str]:
     """Lines of Markdown: a row for each size."""
     names = list(meeting.peers)
     lines = [
-        f"| candidates × knots | {ENUMERATION} [ms] | " + " | ".join(f"{name} [ms]" for name in names) + " |",
-        "|---|---|" + "---|" * len(names),
+        f"| candidates × knots | {ENUMERATION} [ms] | its CPU | " + " | ".join(f"{name} [ms]" for name in names) + " |",
+        "|---|---|---|" + "---|" * len(names),
     ]
     for size in sizes:
         own = meeting.own[size]
         cells = [_cell(meeting.peers[name][size], float(np.median(own.total))) for name in names]
-        lines.append(f"| {size[0]} × {size[1]} | {_milliseconds(own.total)} | " + " | ".join(cells) + " |")
+        ours = f"{_milliseconds(own.total)} | {_milliseconds(own.inside)}"
+        lines.append(f"| {size[0]} × {size[1]} | {ours} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def forces_table(seconds: dict[int, tuple[list[float], list[float]]]) -> list[str]:
+    """Lines of Markdown: the forces of given contacts at 16 knots."""
+    lines = ["| forces of | one QP, daqp [ms] | knot by knot [ms] | |", "|---|---|---|---|"]
+    for contacts, (plain, knots) in seconds.items():
+        ratio = float(np.median(plain) / np.median(knots))
+        what = "one contact" if contacts == 1 else f"{contacts} contacts"
+        lines.append(f"| {what} | {_milliseconds(plain)} | {_milliseconds(knots)} | **{ratio:.0f} ×** |")
     return lines
 
 

@@ -63,10 +63,16 @@ def pack_need(need: Need, packed: Vector) -> None:
     packed[:, 2:4] = need.zmp
     packed[:, 4] = need.weight
     packed[:, 5:7] = need.phantom
-    for row, polygon in zip(packed, need.polygons, strict=True):
+    before = None
+    for k, polygon in enumerate(need.polygons):
+        row = packed[k]
+        if polygon is before:  # standing feet have the same polygon at many knots
+            row[7:] = packed[k - 1, 7:]
+            continue
         row[7] = polygon.plane_height
         row[8 : 8 + MAX_EDGES] = polygon.offsets
         row[8 + MAX_EDGES :] = polygon.normals.ravel()
+        before = polygon
 
 
 def pack_patch(patch: PatchPose, packed: Vector) -> None:
