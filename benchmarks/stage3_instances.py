@@ -59,7 +59,7 @@ def ask(seed: int, *, options: int, knots: int) -> Question:
 
 
 def lean(start: float, *, drift: float, sideways: float, knots: int, lift: Vector | float = 0.0) -> Need:
-    """The ZMP without contact, `start` [m] beyond the feet and drifting on and to the side, and the shift back into them.
+    """The ZMP without contact, `start` [m] beyond the feet and drifting on and sideways, and the shift back into them.
 
     `lift` is c̈_z [m/s²] at every knot.
     """

@@ -5,8 +5,8 @@
 Makes the table in docs/benchmarks_stage3.md and docs/pictures/stage3_peers.svg anew (with --dry only prints). Every
 question goes to the enumeration and to one peer after the other, so that a noisy machine disturbs all alike.
 Counted: for the enumeration everything from `Need` and `Option` objects to forces; for a peer everything from the
-filled arrays of the MIQP to its answer, the hand-over to its interface included; ratios count of a peer only what its
-own `optimize` took. CPU time is shown as well: on a shared machine the wall clock's 99 % is other people's work.
+filled arrays of the MIQP to its answer, the hand-over to its interface included. Ratios are of CPU time, which does not
+count what others do on a shared machine, and count of a peer only what its own `optimize` took.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ class Times:
     """What one solver did on one size."""
 
     total: list[float] = field(default_factory=list)  # [s] hand-over included
-    inside: list[float] = field(default_factory=list)  # [s] in its own `optimize`; of the enumeration, CPU time
+    inside: list[float] = field(
+        default_factory=list
+    )  # [s] of CPU: of a peer's own `optimize`, of all that the enumeration does
     wrong: int = 0  # another optimum, or another opinion on whether there is one
     gave_up: int = 0  # out of time, or failed
     refused: str = ""  # why it was not asked

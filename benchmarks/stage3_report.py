@@ -19,12 +19,14 @@ def table(meeting: Meeting, sizes: list[Size]) -> list[str]:
     """Lines of Markdown: a row for each size."""
     names = list(meeting.peers)
     lines = [
-        f"| candidates × knots | {ENUMERATION} [ms] | its CPU | " + " | ".join(f"{name} [ms]" for name in names) + " |",
+        f"| candidates × knots | {ENUMERATION} [ms] | of it CPU | "
+        + " | ".join(f"{name} [ms]" for name in names)
+        + " |",
         "|---|---|---|" + "---|" * len(names),
     ]
     for size in sizes:
         own = meeting.own[size]
-        cells = [_cell(meeting.peers[name][size], float(np.median(own.total))) for name in names]
+        cells = [_cell(meeting.peers[name][size], float(np.median(own.inside))) for name in names]
         ours = f"{_milliseconds(own.total)} | {_milliseconds(own.inside)}"
         lines.append(f"| {size[0]} × {size[1]} | {ours} | " + " | ".join(cells) + " |")
     return lines
@@ -41,7 +43,7 @@ def forces_table(seconds: dict[int, tuple[list[float], list[float]]]) -> list[st
 
 
 def _cell(times: Times, reference: float) -> str:
-    """Median (99 %) and the ratio; what went wrong."""
+    """Median (99 %) of the wall clock and the ratio of CPU times; what went wrong."""
     if not times.total:
         return times.refused
     notes = [f"{count} {word}" for count, word in ((times.wrong, "wrong"), (times.gave_up, "gave up")) if count]

@@ -1,13 +1,13 @@
 """Stage 3's MIQP for each peer, through the peer's own Python interface. All use one thread.
 
-A solver answers with the optimum, inf when it says infeasible, and the seconds that its own `optimize` took. What
-happens around it, the hand-over of the filled arrays included, is timed by the caller.
+A solver answers with the optimum, inf when it says infeasible, and the seconds of CPU that its own `optimize` took.
+What happens around it, the hand-over of the filled arrays included, is timed by the caller.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
+from time import process_time
 from typing import Any, Protocol
 
 import gurobipy
@@ -32,7 +32,7 @@ class Solver(Protocol):
     """A solver bound to one problem."""
 
     def solve(self) -> tuple[float, float]:
-        """Optimum and seconds in the solver itself."""
+        """Optimum and seconds of CPU in the solver itself."""
         ...
 
 
@@ -44,10 +44,12 @@ class Own:
 
     def solve(self) -> tuple[float, float]:
         """See `Solver.solve`."""
+        begin = process_time()
         solution = self._workspace.solve()
+        seconds = process_time() - begin
         if solution.status is SolveStatus.SOLVED:
-            return self._problem.objective(solution.x), solution.solve_time
-        return (np.inf if solution.status is SolveStatus.INFEASIBLE else np.nan), solution.solve_time
+            return self._problem.objective(solution.x), seconds
+        return (np.inf if solution.status is SolveStatus.INFEASIBLE else np.nan), seconds
 
 
 class _Rows:
@@ -88,14 +90,14 @@ class Gurobi:
             model.addMConstr(rows.less, self._z, "<", rows.bound),
         ]
         model.setMObjective(sparse.csr_matrix(0.5 * form.hessian), form.gradient, 0.0, sense=gurobipy.GRB.MINIMIZE)
-        begin = perf_counter()
+        begin = process_time()
         try:
             model.optimize()
         except gurobipy.GurobiError as error:
             if error.errno == _SIZE_LIMIT:
                 raise Refused("size") from None
             raise
-        seconds = perf_counter() - begin
+        seconds = process_time() - begin
         if model.Status == gurobipy.GRB.OPTIMAL:
             return model.ObjVal, seconds
         infeasible = model.Status in (gurobipy.GRB.INFEASIBLE, gurobipy.GRB.INF_OR_UNBD)
@@ -140,9 +142,9 @@ class Scip:
             model.addCons(pyscipopt.quicksum(c * z[i] * z[j] for i, j, c in entries) <= bill)
         linear = pyscipopt.quicksum(gradient[i] * z[i] for i in gradient.nonzero()[0])
         model.setObjective(linear + pyscipopt.quicksum(bills))
-        begin = perf_counter()
+        begin = process_time()
         model.optimize()
-        seconds = perf_counter() - begin
+        seconds = process_time() - begin
         status = model.getStatus()
         if status in ("optimal", "gaplimit"):
             return model.getObjVal(), seconds
