@@ -23,6 +23,8 @@ from benchmarks.qp_backends import measure, recorded
 from benchmarks.stopwatch import timed, yardstick
 from benchmarks.taps import tapped
 from wbmpc.estimator import Estimator
+from wbmpc.planner.contact_sets import ContactSets
+from wbmpc.planner.knot_forces import KnotForces
 from wbmpc.plant import Plant
 from wbmpc.qp import MIQP_BACKENDS
 from wbmpc.qp.workspace import qp_backend_names
@@ -39,12 +41,14 @@ TICK_PARTS = (
     ("physics and truth", Plant, "step"),
     ("recorder", Recorder, "append"),
 )
+STAGE_3 = (  # which solves without workspaces, which could be tapped
+    ("  stage 3: choice at firing", ContactSets, "solve"),
+    ("  stage 3: forces", KnotForces, "solve"),
+)
 QPS = {  # the QPs inside the stages, by tap, or by the class that made several (benchmarks/taps.py)
     "ComHeightStage 1": "  stage 1: QP",
     "HorizontalMotion": "  stage 2: QPs of the CoM",
     "JointVelocities 1": "  stage 2: QP of the joints",
-    "ContactChoice 1": "  stage 3: MIQP at firing",
-    "ContactForce 1": "  stage 3: QP of the forces",
     "Tracker 1": "  tracker: QP",
 }
 STEPS = 60  # solves of each backend on each recorded QP
@@ -61,7 +65,7 @@ def _row(table: Table, name: str, seconds: Sequence[float]) -> None:
 def report_run(console: Console, name: str) -> None:
     """Times of one scenario, stage by stage, and how fast it ran with a recording and without."""
     path = ROOT / "scenarios" / f"{name}.yaml"
-    methods = [(owner, method) for _, owner, method in TICK_PARTS]
+    methods = [(owner, method) for _, owner, method in (*TICK_PARTS, *STAGE_3)]
     with TemporaryDirectory() as folder, tapped() as taps, timed(*methods, (RerunSink, "flush")) as parts:
         result = run_scenario(load_scenario(path), name=name, recording=Path(folder) / f"{name}.rrd")
     bare = run_scenario(load_scenario(path), name=name)
@@ -84,6 +88,8 @@ def report_run(console: Console, name: str) -> None:
             if title.startswith(f"  stage {stage[-1]}"):
                 solves = [s for tap in taps.values() if label in (tap.label, tap.maker) for s in tap.seconds]
                 _row(table, title, solves)
+    for (part, _, _), seconds in zip(STAGE_3, parts[len(TICK_PARTS) :], strict=False):
+        _row(table, part, seconds)
     console.print(table)
     ticks = len(recorder.command_solve_time)
     console.print(f"recording: {1e6 * (sum(parts[3]) + sum(flushes)) / ticks:.1f} µs a tick, flushes included")

@@ -74,7 +74,8 @@ MOMENTS = (
 def record(run: str, out: Path) -> None:
     """Save the moments of one run in the folder `out`."""
     name, changes = RUNS[run]
-    scenario = load_scenario(ROOT / "scenarios" / f"{name}.yaml", changes)
+    plain = {"planner.miqp_backend": "daqp"}  # stage 3 as the QPs of `QuadraticProgram`
+    scenario = load_scenario(ROOT / "scenarios" / f"{name}.yaml", {**changes, **plain})
     robot = Robot.load(robot_path(scenario))
     recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
     left = {moment.name: moment for moment in MOMENTS if moment.run == run}

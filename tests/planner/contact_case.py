@@ -6,7 +6,7 @@ import numpy as np
 from newton_euler import centre_of_pressure
 from robots import standing_polygon
 
-from wbmpc.planner.contact_choice import ContactChoice
+from wbmpc.planner.contact_choice import KNOTS
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.scenario import PatchPose
@@ -16,7 +16,7 @@ MASS, HEIGHT = 3.43, 0.25  # [kg], [m] CoM
 SETTINGS = ContactSettings()
 POLYGON = standing_polygon(margin=0.018)
 FRONT = float(POLYGON.offsets[np.argmax(POLYGON.normals[:, 0])])  # [m] foremost place of the feet's pressure
-KNOTS = ContactChoice.KNOTS
+
 UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from wbmpc.planner.contact_choice import ContactChoice, Option
+from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need
+from wbmpc.planner.contact_stage import make_contact_choice
 from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.pace import hurried, way_time
 from wbmpc.planner.posture import PalmTarget, Posture
@@ -79,12 +80,9 @@ class Candidates:
         self._turn = -1
         self._stand: tuple[bytes, ...] = ()  # where the feet were at the last refresh
         self._left = np.array([0.0, 1.0])  # unit, to the robot's left
-        self._backend = backend
-        slots = min(len(self.all), settings.most_candidates)
-        self._choice = ContactChoice(slots, settings, mass=robot.mass, backend=backend) if slots else None
-        most = settings.most_contacts
-        self._given = ContactChoice(most, settings, mass=robot.mass, backend="daqp") if slots else None
-        self._slots = slots
+        self._slots = min(len(self.all), settings.most_candidates)
+        room = max(self._slots, len(SIDES))  # for contacts that are held, however few candidates are considered
+        self._choice = make_contact_choice(backend, room, settings, mass=robot.mass) if self.all else None
 
     def refresh(
         self,
@@ -149,7 +147,7 @@ class Candidates:
         polygon: SupportPolygon,
         urgency: float,
     ) -> tuple[list[Candidate], tuple[CandidateReport, ...], StageReport]:
-        """Stage 3 for a need of ContactChoice.KNOTS knots.
+        """Stage 3 for a need of KNOTS knots.
 
         Args:
             palms: (2, 3) where the palms are [m]: closer patches are cheaper.
@@ -178,16 +176,13 @@ class Candidates:
             choice = self._choice.solve(need, [*held, *options], left=self._left)
             stage = StageReport(choice.solution.status, choice.solution.solve_time, choice.solution.iterations)
             winners, best = [considered[i - len(held)] for i in choice.winners], choice.objective
-        weighed = {id(c): option for c, option in zip(considered, options, strict=True)}
+        weighed = self._weigh(need, considered, options, winners=winners, held=held)
         reports = []
         for candidate in self.all:
-            cost, forces, reason = np.inf, np.zeros((ContactChoice.KNOTS, 3)), reasons.get(id(candidate), "")
+            cost, forces, reason = np.inf, np.zeros((1, 3)), reasons.get(id(candidate), "")
             if id(candidate) in weighed:
-                company = [weighed[id(w)] for w in winners if w is not candidate and w.hand != candidate.hand]
-                if len(winners) + len(held) < self._settings.most_contacts:
-                    company = []  # it could take the single winner's place, whichever hand that has
-                cost, forces = self._cost_of(need, weighed[id(candidate)], [*held, *company])
-                reason = _reason(candidate, cost, best=best, winners=winners, company=bool(held or company))
+                cost, forces, company = weighed[id(candidate)]
+                reason = _reason(candidate, cost, best=best, winners=winners, company=company)
             reports.append(
                 CandidateReport(
                     patch=candidate.patch.name,
@@ -204,9 +199,9 @@ class Candidates:
 
     def carry(self, need: Need, contacts: list[Option]) -> float:
         """Stage 3's objective with these contacts and no other; inf when they cannot give what is needed."""
-        if self._given is None or not contacts:
+        if self._choice is None or not contacts:
             return np.inf
-        return self._given.solve(need, [replace(contact, held=True) for contact in contacts], left=self._left).objective
+        return self._choice.costs(need, contacts, [tuple(range(len(contacts)))], left=self._left)[0][0]
 
     def _sort_out(
         self,
@@ -241,13 +236,33 @@ class Candidates:
                 reasons[key] = f"there {1e3 * late:.0f} ms too late"
         return distances, reasons
 
-    def _cost_of(self, need: Need, option: Option, company: list[Option]) -> tuple[float, Vector]:
-        """Objective with this option taken beside `company`, prices included, and its forces (KNOTS, 3) [N]."""
-        assert self._given is not None
-        together = [replace(other, held=True) for other in (option, *company)]
-        answer = self._given.solve(need, together, left=self._left)
-        price = option.price + sum(other.price for other in company if not other.held)
-        return answer.objective + price, answer.forces[0]
+    def _weigh(
+        self,
+        need: Need,
+        considered: list[Candidate],
+        options: list[Option],
+        *,
+        winners: list[Candidate],
+        held: list[Option],
+    ) -> dict[int, tuple[float, Vector, bool]]:
+        """Each candidate's cost, prices included, and forces (knots, 3) [N] beside those it would have as company.
+
+        By id of the candidate; and whether it has company at all: what is held, and the other hand's winner, unless the
+        candidate could take the single winner's place, whichever hand that has.
+        """
+        if self._choice is None or not considered:
+            return {}
+        place = {id(candidate): len(held) + i for i, candidate in enumerate(considered)}
+        full = len(winners) + len(held) >= self._settings.most_contacts
+        sets = []
+        for candidate in considered:
+            beside = [place[id(w)] for w in winners if full and w is not candidate and w.hand != candidate.hand]
+            sets.append((place[id(candidate)], *range(len(held)), *beside))
+        answers = self._choice.costs(need, [*held, *options], sets, left=self._left)
+        return {
+            id(candidate): (cost, forces[0], len(members) > 1)
+            for candidate, (cost, forces), members in zip(considered, answers, sets, strict=True)
+        }
 
 
 def _reason(candidate: Candidate, cost: float, *, best: float, winners: list[Candidate], company: bool) -> str:

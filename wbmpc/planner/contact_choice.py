@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from wbmpc.qp import QpSolution, QuadraticProgram, make_mip_workspace
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SIDES, SolveStatus, Vector
 
+KNOTS = 2  # at which stage 3 asks for a choice
 CROSSING_GAP = 0.05  # [m] by which the left hand's contact is to the left of the right hand's
 
 
@@ -62,19 +63,17 @@ class ContactChoice:
     problem stays exact.
     """
 
-    KNOTS = 2
-
-    def __init__(self, options: int, settings: ContactSettings, *, mass: float, backend: str) -> None:
-        """For at most `options` options at a time; `backend` is a key of MIQP_BACKENDS."""
-        self._options, self._settings, self._mass = options, settings, mass
-        self._forces = 3 * self.KNOTS * options
+    def __init__(
+        self, options: int, settings: ContactSettings, *, mass: float, backend: str, knots: int = KNOTS
+    ) -> None:
+        """For at most `options` options at a time and needs of `knots` knots; `backend` is a key of MIQP_BACKENDS."""
+        self._settings, self._mass, self._knots = settings, mass, knots
+        self._forces = 3 * knots * options
         self._knot_rows = 2 + MAX_EDGES
-        self._sums = (
-            self.KNOTS * self._knot_rows + options * self.KNOTS * 5
-        )  # first of: count, crossing, hands, patches
+        self._sums = knots * (self._knot_rows + 5 * options)  # first row of: count, crossing, hands, patches
         rows = self._sums + 2 + len(SIDES) + options // 2
         soft = np.zeros(rows)
-        for knot in range(self.KNOTS):
+        for knot in range(knots):
             # the equality is in N m; the slack's price is per metre of shift
             soft[knot * self._knot_rows : knot * self._knot_rows + 2] = (
                 settings.shift_slack_cost / (mass * GRAVITY) ** 2
@@ -84,41 +83,61 @@ class ContactChoice:
         self._workspace = make_mip_workspace(backend, self.problem)
 
     def solve(self, need: Need, options: Sequence[Option], *, left: Vector) -> Choice:
-        """Choose among `options` (at most as many as built for) for a need of KNOTS knots.
+        """Choose among `options` (at most as many as built for) for a need of as many knots as built for.
 
         Args:
             left: (2,) unit vector to the robot's left.
         """
-        qp, forces, slots = self.problem, self._forces, self._options
+        self.pose(need, options, left=left)
+        solution, forces, knots = self._workspace.solve(), self._forces, self._knots
+        if solution.status != SolveStatus.SOLVED:
+            return Choice((), np.zeros((len(options), knots, 3)), np.inf, solution)
+        x = solution.x
+        taken = x[forces : forces + len(options)] > 0.5
+        return Choice(
+            winners=tuple(i for i, option in enumerate(options) if taken[i] and not option.held),
+            forces=x[:forces].reshape(-1, knots, 3)[: len(options)].copy(),
+            objective=self.problem.objective(x),
+            solution=solution,
+        )
+
+    def pose(self, need: Need, options: Sequence[Option], *, left: Vector) -> None:
+        """Write `problem`, as `solve` does before it solves."""
+        qp, forces = self.problem, self._forces
         qp.matrix[:] = 0.0
         qp.gradient[:] = 0.0
         qp.lower[:], qp.upper[:] = -np.inf, 0.0
         qp.x_lower[:forces], qp.x_upper[:forces] = -np.inf, np.inf
         qp.x_lower[forces:], qp.x_upper[forces:] = 0.0, 1.0
         # solvers want strict convexity; unused slots and binaries have no curvature of their own
-        qp.hessian[:] = 1e-6 * np.eye(forces + slots)
+        qp.hessian[:] = 1e-6 * np.eye(qp.variables)
         h, q = shift_bound(need), polygon_bound(need)
-        for knot in range(self.KNOTS):
+        for knot in range(self._knots):
             first = knot * self._knot_rows
             qp.lower[first : first + 2] = qp.upper[first : first + 2] = h[knot]
             qp.upper[first + 2 : first + self._knot_rows] = q[knot]
         for i, option in enumerate(options):
             self._fill(i, option, need)
-        unused = 3 * self.KNOTS * len(options)
+        unused = 3 * self._knots * len(options)
         qp.x_lower[unused:forces] = qp.x_upper[unused:forces] = 0.0
         qp.x_upper[forces + len(options) :] = 0.0
         self._fill_sums(options, left)
-        solution = self._workspace.solve()
-        if solution.status != SolveStatus.SOLVED:
-            return Choice((), np.zeros((len(options), self.KNOTS, 3)), np.inf, solution)
-        x = solution.x
-        taken = x[forces : forces + len(options)] > 0.5
-        return Choice(
-            winners=tuple(i for i, option in enumerate(options) if taken[i] and not option.held),
-            forces=x[:forces].reshape(slots, self.KNOTS, 3)[: len(options)].copy(),
-            objective=qp.objective(x),
-            solution=solution,
-        )
+
+    def costs(
+        self, need: Need, options: Sequence[Option], sets: Sequence[tuple[int, ...]], *, left: Vector
+    ) -> list[tuple[float, Vector]]:
+        """Stage 3's objective with exactly these `sets` of options and no other, and their forces.
+
+        Returns:
+            For every set, its cost with the prices of those that are not held, inf when it is not admissible or cannot
+            give what is needed; and forces (members, knots, 3) [N] in world, in the order of the members.
+        """
+        answers = []
+        for members in sets:
+            choice = self.solve(need, [replace(options[i], held=True) for i in members], left=left)
+            price = sum(options[i].price for i in members if not options[i].held)
+            answers.append((choice.objective + price, choice.forces))
+        return answers
 
     def _fill(self, i: int, option: Option, need: Need) -> None:
         """Costs, cone and cap of option `i`, and its share of the sums over the forces."""
@@ -127,10 +146,10 @@ class ContactChoice:
         qp.x_lower[binary] = 1.0 if option.held else 0.0
         cone, price = cone_rows(patch), force_price(patch, self._settings, self._mass)
         G, P = shift_rows(need, patch.position), polygon_rows(need, patch.position)
-        for knot in range(self.KNOTS):
-            columns = slice(3 * (self.KNOTS * i + knot), 3 * (self.KNOTS * i + knot) + 3)
+        for knot in range(self._knots):
+            columns = slice(3 * (self._knots * i + knot), 3 * (self._knots * i + knot) + 3)
             first = knot * self._knot_rows
-            row = self.KNOTS * self._knot_rows + 5 * (self.KNOTS * i + knot)
+            row = self._knots * self._knot_rows + 5 * (self._knots * i + knot)
             qp.hessian[columns, columns] = price
             qp.matrix[first : first + 2, columns] = G[knot]
             qp.matrix[first + 2 : first + self._knot_rows, columns] = P[knot]

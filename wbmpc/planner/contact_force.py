@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,9 @@ from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
 from wbmpc.rotations import contact_frame
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SolveStatus, Vector
+
+PADDING = 1e3  # [m] offset of a padded edge: f_z ≤ the feet's weight
+POLYGON_PRICE = 1e4  # of a soft polygon row, in prices of the shift
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +90,9 @@ def polygon_bound(need: Need) -> Vector:
 
 
 def _half_planes(need: Need) -> tuple[Vector, Vector]:
-    """Normals (n, MAX_EDGES, 2) and offsets (n, MAX_EDGES) [m]; a padded row says f_z ≤ the feet's weight, roughly."""
+    """Normals (n, MAX_EDGES, 2) and offsets (n, MAX_EDGES) [m]; a padded row says f_z ≤ the feet's weight."""
     offsets = np.array([polygon.offsets for polygon in need.polygons])
-    return np.array([polygon.normals for polygon in need.polygons]), np.where(np.isfinite(offsets), offsets, 1e3)
+    return np.array([polygon.normals for polygon in need.polygons]), np.where(np.isfinite(offsets), offsets, PADDING)
 
 
 def cone_rows(patch: PatchPose) -> Vector:
@@ -118,7 +122,7 @@ class ContactForce:
         rows = steps * self._rows_per_knot
         soft = np.zeros((steps, self._rows_per_knot))
         soft[:, :2] = settings.shift_slack_cost / (mass * GRAVITY) ** 2
-        soft[:, 2 : 2 + MAX_EDGES] = 1e4 * settings.shift_slack_cost / (mass * GRAVITY) ** 2
+        soft[:, 2 : 2 + MAX_EDGES] = POLYGON_PRICE * settings.shift_slack_cost / (mass * GRAVITY) ** 2
         self.problem = QuadraticProgram(steps * width, rows, soft_weight=soft.ravel())
         self._settings, self._mass = settings, mass
         self.problem.hessian[:] = np.eye(steps * width) * (settings.force_cost / (mass * GRAVITY) ** 2)
@@ -129,7 +133,7 @@ class ContactForce:
         self._knots = np.arange(steps)
         self._workspace = make_workspace(backend, self.problem)
 
-    def solve(self, need: Need, patches: list[PatchPose | None], caps: Vector) -> tuple[Vector | None, QpSolution]:
+    def solve(self, need: Need, patches: Sequence[PatchPose | None], caps: Vector) -> tuple[Vector | None, QpSolution]:
         """Forces (contacts, steps, 3) [N] in world for the wanted shifts.
 
         Args:

@@ -8,7 +8,8 @@ import numpy as np
 
 from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
-from wbmpc.planner.contact_force import ContactForce, Need
+from wbmpc.planner.contact_force import Need
+from wbmpc.planner.contact_stage import make_force_stage
 from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.pace import hurried
@@ -49,9 +50,7 @@ class Contacts:
         self.candidates = Candidates(
             robot, patches, contact, keep_out=keep_out, nominal=nominal, backend=settings.miqp_backend
         )
-        self._force_stage = ContactForce(
-            len(times), contact, mass=robot.mass, contacts=len(SIDES), backend=settings.qp_backend
-        )
+        self._force_stage = make_force_stage(settings, mass=robot.mass, steps=len(times), contacts=len(SIDES))
         self._together = Posture(robot, nominal=nominal, com_cost=TOGETHER_COST)
         self.forces = np.zeros((len(SIDES), len(times), 3))  # [N] planned, in world
         self._needed, self._quiet = False, True  # of the shift as a whole

@@ -131,7 +131,10 @@ class PlannerSettings(StrictModel):
     horizon_step: float = Field(0.1, gt=0, le=0.5, description="T [s], time between knots")
     contact_stage: bool = Field(True, description="false turns stage 3 off: ΔZ = 0 always (a counterfactual)")
     qp_backend: str = Field("daqp", description="QP backend of stages 1 and 2: daqp, osqp or any name of qpsolvers")
-    miqp_backend: str = Field("daqp", description="MIQP backend of stage 3: daqp or highs")
+    miqp_backend: Literal["enumeration", "daqp", "highs"] = Field(
+        "enumeration",
+        description="stage 3: enumeration with one small QP a knot, or its plain (MI)QPs, the choice on daqp or highs",
+    )
     feedback: float = Field(0.02, ge=0, le=1, description="share of the measured CoM error taken over at every plan")
     feedback_large: float = Field(0.5, ge=0, le=1, description="the same for errors above 2 feedback_knee")
     feedback_knee: float = Field(0.005, gt=0, description="[m] capture-point error from which the share grows")
