@@ -43,9 +43,9 @@ KEPT_UP: dict[str, float] = {
     "plans": 200,
     "late_plans": 10,
     "skipped_plans": 7,
-    "plan_latency_p50": 0.006,
-    "plan_latency_p99": 0.012,
-    "plan_latency_max": 0.015,
+    "plan_ready_p50": 0.006,
+    "plan_ready_p99": 0.012,
+    "plan_ready_max": 0.015,
     "missed_deadlines": 3,
     "ticks": 2000,
     "drift": 0.004,
@@ -147,7 +147,7 @@ def test_a_real_time_run_says_how_it_kept_up(call: Any, fake: list[Any], scenari
     result = call("run", scenario, "--out", tmp_path, "--realtime")
     (line,) = (line for line in result.output.splitlines() if "plans/s" in line)
     plans, ticks = line.split("; ")
-    assert plans == "calm: 98.5 plans/s, 5.0 % late, 7 skipped, latency [ms] p50 6, p99 12, max 15"
+    assert plans == "calm: 98.5 plans/s, 5.0 % late, 7 skipped, ready after [ms] p50 6, p99 12, max 15"
     assert ticks == "3 of 2000 ticks missed, drift 0.004 s"
     assert "plans/s" not in call("run", scenario, "--out", tmp_path).output
 

@@ -48,6 +48,19 @@ def test_a_standing_robot_in_real_time() -> None:
     assert active_count() == threads
 
 
+def test_without_late_plans_it_is_the_lockstep_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ticks of 40 ms: the planner has 0.4 s for each plan, and every plan waits until its delay is over."""
+    monkeypatch.setattr(realtime, "_wait_until", lambda deadline: sleep(0.04) or 0.0)  # type: ignore[func-returns-value]
+    scenario = stand(duration=0.06, sensors__noise_scale=1.0, seed=5)
+    timing, recorder = finished(scenario, run=run_realtime)
+    if timing.late_plans or timing.skipped_plans:
+        pytest.skip("no plan in 0.4 s: the machine is too slow to tell")
+    _, lockstep = finished(scenario)
+    assert recorder.state_sha256 == lockstep.state_sha256
+    assert timing.effects == [snapshot + 10 for snapshot in timing.snapshots]
+    assert timing.plan_ready.max() < 0.0105
+
+
 def test_replay_in_lockstep_repeats_the_bits() -> None:
     """What makes a threaded run unrepeatable is when its plans are ready: charge that, and nothing else is left."""
     scenario = stand(duration=0.3, sensors__noise_scale=1.0, seed=5)

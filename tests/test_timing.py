@@ -22,13 +22,14 @@ def test_summary_counts_and_percentiles() -> None:
     timing.begin(timestep=1e-3, realtime=True)
     for k in range(101):
         timing.tick(1e-5 * k, 2e-5 * k)
-    timing.plan(snapshot=10, effect=14)
-    timing.plan(snapshot=20, effect=32)
+    timing.plan(snapshot=10, effect=14, ready=12)
+    timing.plan(snapshot=20, effect=32, ready=32)
     timing.late_plans, timing.wall_time, timing.simulated_time = 1, 0.202, 0.101
     summary = timing.summary()
     np.testing.assert_allclose([summary[f"tick_late_{p}"] for p in ("p50", "p99", "max")], [5e-4, 9.9e-4, 1e-3])
     np.testing.assert_allclose([summary[f"tick_time_{p}"] for p in ("p50", "p99", "max")], [1e-3, 1.98e-3, 2e-3])
     np.testing.assert_allclose([summary["plan_latency_p50"], summary["plan_latency_max"]], [8e-3, 12e-3])
+    np.testing.assert_allclose([summary["plan_ready_p50"], summary["plan_ready_max"]], [7e-3, 12e-3])
     assert (summary["ticks"], summary["plans"], summary["late_plans"]) == (101, 2, 1)
     assert summary["real_time_factor"] == pytest.approx(0.5)
     assert summary["drift"] == pytest.approx(0.101)
@@ -41,7 +42,8 @@ def test_nothing_is_late_where_there_is_no_clock() -> None:
     assert timing.ticks == 50
     assert timing.tick_time.min() > 0.0
     assert [key for key, value in summary.items() if np.isnan(value)] == [
-        "drift", "tick_late_p50", "tick_late_p99", "tick_late_max", "planner_rate"
+        "drift", "tick_late_p50", "tick_late_p99", "tick_late_max", "planner_rate",
+        "plan_ready_p50", "plan_ready_p99", "plan_ready_max"
     ]  # fmt: skip
 
 

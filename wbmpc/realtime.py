@@ -41,11 +41,11 @@ def run_realtime(
     the wall clock, later ticks follow without a pause until the lag is made up, and every tick that begins more than a
     timestep late counts as a missed deadline.
 
-    A plan takes effect at the first tick after it is ready. Its latency is counted in the loop's time, from the state
-    it was computed from to that tick, so that a lockstep run whose `schedule` charges the recorded latencies to the
-    plans at their recorded times repeats the run bit for bit. A plan later than one planner period is counted; until it
-    comes the one before it is continued. A snapshot that a newer one replaced before the planner came to it is counted
-    as skipped.
+    A plan takes effect `loop.planner_delay` after its snapshot, as in lockstep: a run whose plans are all ready by then
+    is the lockstep run, bit for bit. A later one takes effect at the first tick after it is ready; until then the one
+    before it is continued. Ticks count the loop's time, so that a lockstep run with the recorded `schedule` repeats
+    what late plans have done. A plan that is ready neither by its delay nor within one planner period is counted as
+    late, a snapshot that a newer one replaced before the planner came to it as skipped.
 
     Args:
         sink: flushed once, after the last tick, because a flush waits for the file: a killed run leaves an empty one.
@@ -61,6 +61,7 @@ def run_realtime(
     _warm_up(scenario, robot, model)
     session = Session(scenario, robot=robot, model=model, recorder=recorder)
     period, step, timing = scenario.loop.planner_period_ticks, session.step, recorder.timing
+    delay = scenario.loop.planner_delay_ticks
     timing.begin(timestep=step, realtime=True)
     finished = Mailbox()  # the tracker sees a plan only when the tick has taken it over and counted its latency
     worker = PlannerThread(session.planner, finished)
@@ -70,11 +71,12 @@ def run_realtime(
         """Take the plans that are ready, hand over a snapshot when one is due."""
         worker.check()
         for plan in finished.arrived(state.time):
-            session.mailbox.post(plan, available_at=state.time)
+            snapshot, ready = round(plan.time / step), recorder.ticks
+            effect = max(ready, snapshot + delay)
+            session.mailbox.post(plan, available_at=plan.time + (effect - snapshot) * step)
             recorder.append_plan(plan.report)
-            snapshot, effect = round(plan.time / step), recorder.ticks
-            timing.plan(snapshot=snapshot, effect=effect)
-            timing.late_plans += effect - snapshot > period
+            timing.plan(snapshot=snapshot, effect=effect, ready=ready)
+            timing.late_plans += ready - snapshot > max(delay, period)
         if due:
             worker.request(state)
 

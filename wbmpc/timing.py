@@ -45,10 +45,11 @@ class LoopTiming:
         self.wall_time = 0.0  # [s] of the loop
         self.simulated_time = 0.0  # [s]
         self.missed_deadlines = 0  # ticks that began more than a timestep late; 0 in lockstep
-        self.late_plans = 0  # plans that were not ready one planner period after their snapshot; 0 in lockstep
+        self.late_plans = 0  # not ready by their delay, nor one planner period after their snapshot; 0 in lockstep
         self.skipped_plans = 0  # snapshots that a newer one replaced before the planner came to them; 0 in lockstep
         self.snapshots: list[int] = []  # ticks of the snapshots that were planned
         self.effects: list[int] = []  # ticks from which those plans were in effect
+        self.ready: list[int] = []  # ticks at which a planner in its thread had them ready
 
     def begin(self, *, timestep: float, realtime: bool) -> None:
         """Say what kind of loop fills this, before its first tick."""
@@ -64,10 +65,12 @@ class LoopTiming:
         self._duration[k] = duration
         self._ticks = k + 1
 
-    def plan(self, *, snapshot: int, effect: int) -> None:
-        """One plan: the ticks of its snapshot and of its first use."""
+    def plan(self, *, snapshot: int, effect: int, ready: int | None = None) -> None:
+        """One plan: the ticks of its snapshot, of its first use, and, from a thread, of when it was there."""
         self.snapshots.append(snapshot)
         self.effects.append(effect)
+        if ready is not None:
+            self.ready.append(ready)
 
     @property
     def ticks(self) -> int:
@@ -90,6 +93,11 @@ class LoopTiming:
         return (np.array(self.effects, int) - np.array(self.snapshots, int)) * self.timestep
 
     @property
+    def plan_ready(self) -> FloatArray:
+        """(plans,) [s] the loop's time from each plan's snapshot to when it was ready; empty in lockstep."""
+        return (np.array(self.ready, int) - np.array(self.snapshots[: len(self.ready)], int)) * self.timestep
+
+    @property
     def drift(self) -> float:
         """By how much simulated time lags the wall clock at the end [s]; negative when it is ahead."""
         return self.wall_time - self.simulated_time
@@ -108,6 +116,7 @@ class LoopTiming:
             "planner_rate": len(self.effects) / self.wall_time if self.realtime and ran else nan,
             "late_plans": self.late_plans,
             "skipped_plans": self.skipped_plans,
+            **_percentiles("plan_ready", self.plan_ready),
             **_percentiles("plan_latency", self.plan_latency),
         }
 

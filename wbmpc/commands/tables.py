@@ -44,10 +44,10 @@ def print_checks(title: str, checks: Sequence[CheckResult]) -> None:
 def timing_line(name: str, timing: Mapping[str, float]) -> str:
     """How a real-time run kept up, from its verdict's `timing`."""
     late = 100 * timing["late_plans"] / max(timing["plans"], 1)
-    latency = ", ".join(f"{level} {number(1e3 * timing[f'plan_latency_{level}'])}" for level in ("p50", "p99", "max"))
+    ready = ", ".join(f"{level} {number(1e3 * timing[f'plan_ready_{level}'])}" for level in ("p50", "p99", "max"))
     return (
         f"{name}: {number(timing['planner_rate'])} plans/s, {late:.1f} % late, {timing['skipped_plans']} skipped, "
-        f"latency [ms] {latency}; {timing['missed_deadlines']} of {timing['ticks']} ticks missed, "
+        f"ready after [ms] {ready}; {timing['missed_deadlines']} of {timing['ticks']} ticks missed, "
         f"drift {timing['drift']:.3f} s"
     )
 

@@ -49,7 +49,8 @@ _PLOTS = {
     "Timing": {
         "Tick began late [ms]": "/timing/tick_start_late",
         "Tick [ms]": "/timing/tick_time",
-        "Plan latency [ms]": "/timing/plan_latency",
+        "Plan in use [ms]": "/timing/plan_latency",
+        "Plan ready [ms]": "/timing/plan_ready",
     },
 }
 # Tab -> title and entity of the state lanes under its plots.

@@ -18,6 +18,7 @@ def describe_timing(stream: Stream) -> None:
     stream.series("/timing/tick_start_late", ["latest begin since the last sample [ms]"], [FAULT])
     stream.series("/timing/tick_time", ["longest tick since the last sample [ms]"], [MEASURED])
     stream.series("/timing/plan_latency", ["from snapshot to first use [ms]"], [PLANNED])
+    stream.series("/timing/plan_ready", ["from snapshot to ready [ms]"], [MEASURED])
 
 
 def write_tick_timing(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], stride: int) -> None:
@@ -42,4 +43,6 @@ def write_plan_timing(stream: Stream, timing: LoopTiming, since: int) -> None:
         return
     time = np.array(effects) * timing.timestep
     stream.scalars("/timing/plan_latency", time, 1e3 * timing.plan_latency[since:])
+    if timing.ready:
+        stream.scalars("/timing/plan_ready", time, 1e3 * timing.plan_ready[since:])
     stream.values(SCHEDULE, time, snapshot_tick=snapshots, effect_tick=effects)
