@@ -19,7 +19,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.qp_backends import measure, recorded
+from benchmarks.qp_backends import measure
+from benchmarks.qp_families import recorded
 from benchmarks.stopwatch import timed, yardstick
 from benchmarks.taps import tapped
 from wbmpc.estimator import Estimator

@@ -92,9 +92,9 @@ def micro(seconds: Sequence[float], percentile: float) -> str:
 def ratio(theirs: Sequence[Sequence[float]], ours: Sequence[Sequence[float]]) -> str:
     """How many times ours theirs takes: median over interleaved blocks of the ratio of p50s, and its 10–90 % range.
 
-    Both hold one list of seconds for each block; the blocks of one index ran next to each other.
+    Both hold one list of seconds for each block; the blocks of one index ran next to each other; one may have fewer.
     """
-    ratios = [float(np.median(a) / np.median(b)) for a, b in zip(theirs, ours, strict=True) if len(a) and len(b)]
+    ratios = [float(np.median(a) / np.median(b)) for a, b in zip(theirs, ours, strict=False)]
     if not ratios:
         return "–"
     low, middle, high = np.percentile(ratios, [10, 50, 90])
