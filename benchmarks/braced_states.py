@@ -77,7 +77,8 @@ def _listening(ticks: Ticks) -> Iterator[None]:
 
 
 def plain(ticks: Ticks) -> Ticks:
-    """The same ticks without what only this project's tracker knows: obstacles of the arms, urgency, a mass estimate."""
+    """The same ticks without what only this project's tracker knows: obstacles of the arms, urgency, a mass
+    estimate."""
     keep_out = np.array(ticks.setpoints[0].arm_keep_out)
     keep_out[..., 3] = -np.inf
     return replace(

@@ -18,8 +18,8 @@ MOST_ITERATIONS = 100
 class Hpipm:
     """One problem shape: memory is made once, `solve` copies the numbers and solves.
 
-    Hard rows and variables with one value for both bounds are equations, soft rows are HPIPM's own. It is started anew at every solve: its
-    warm start took longer.
+    Hard rows and variables with one value for both bounds are equations, soft rows are HPIPM's own. It is started anew
+    at every solve: its warm start took longer.
     """
 
     def __init__(self, problem: QuadraticProgram, *, tolerance: float) -> None:

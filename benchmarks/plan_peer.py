@@ -33,8 +33,8 @@ SNAPSHOTS = 800  # from the start of `reach` to the middle of its hold
 BLOCK = 20  # plans
 BACKENDS = ("daqp", "qpsolvers:osqp")
 TOLERANCE = 1e-3  # [m] of the planned CoM
-NOTE = f"""The snapshots are those of a lockstep run of `reach`; both planners see all of them, {BLOCK} in turn. A planner
-remembers what it has planned, so a difference of one plan lives on in the next. Stage 3 is daqp's in both."""
+NOTE = f"""The snapshots are those of a lockstep run of `reach`; both planners see all of them, {BLOCK} in turn. A
+planner remembers what it has planned, so a difference of one plan lives on in the next. Stage 3 is daqp's in both."""
 
 
 class _Enough(Exception):
@@ -88,9 +88,7 @@ def measure(path: Path = REACH, count: int = SNAPSHOTS) -> Section:
     scenario = load_scenario(path)
     robot = Robot.load(robot_path(scenario))
     states = snapshots(scenario, robot, count)
-    planners = {
-        backend: planner(load_scenario(path, {"planner.qp_backend": backend}), robot) for backend in BACKENDS
-    }
+    planners = {backend: planner(load_scenario(path, {"planner.qp_backend": backend}), robot) for backend in BACKENDS}
     reports: dict[str, list[PlanReport]] = {backend: [] for backend in BACKENDS}
     blocks: dict[str, list[list[float]]] = {backend: [] for backend in BACKENDS}
     with silent(), no_garbage_collection():

@@ -8,12 +8,14 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table as RichTable
 
+WIDTH = 120  # of a paragraph
 MARK = "<!-- {} -->"  # line around a section, so that `write` replaces only what was measured anew
 
 
@@ -47,7 +49,7 @@ class Section:
                 shown.add_row(*row)
             console.print(shown)
         for note in self.notes:
-            console.print(note, markup=False)
+            console.print(" ".join(note.split()), markup=False)
 
     def markdown(self, footer: str) -> str:
         """The section of docs/benchmarks.md; `footer` says where and how fast the machine was."""
@@ -59,18 +61,17 @@ class Section:
         for picture in self.pictures:
             lines += [f"![{self.title}](pictures/{picture})", ""]
         for note in self.notes:
-            lines += [note, ""]
+            lines += [*wrap(" ".join(note.split()), WIDTH, break_on_hyphens=False), ""]
         return "\n".join([*lines, f"*{footer}*", ""])
 
 
-def write(path: Path, sections: Sequence[Section], footers: Sequence[str]) -> None:
-    """Put each section in the place of its last measurement in the file, new ones at the end."""
+def write(path: Path, section: Section, footer: str) -> None:
+    """Put the section in the place of its last measurement in the file, a new one at the end."""
     text = path.read_text(encoding="utf-8") if path.exists() else HEAD
-    for section, footer in zip(sections, footers, strict=True):
-        begin, end = MARK.format(section.part), MARK.format(f"end of {section.part}")
-        block = f"{begin}\n{section.markdown(footer)}{end}\n"
-        pattern = re.compile(f"{re.escape(begin)}\n.*?{re.escape(end)}\n", re.DOTALL)
-        text = pattern.sub(lambda _, block=block: block, text) if pattern.search(text) else f"{text}\n{block}"
+    begin, end = MARK.format(section.part), MARK.format(f"end of {section.part}")
+    block = f"{begin}\n{section.markdown(footer)}{end}\n"
+    pattern = re.compile(f"{re.escape(begin)}\n.*?{re.escape(end)}\n", re.DOTALL)
+    text = pattern.sub(lambda _: block, text) if pattern.search(text) else f"{text}\n{block}"
     path.write_text(text, encoding="utf-8")
 
 
@@ -108,8 +109,8 @@ def _row(cells: Sequence[str]) -> str:
 
 HEAD = """# Benchmarks
 
-Written by `make bench`: every number below was measured by the command over it, peers and this project alternating block by
-block in one run, the same answer checked first. A ratio is the median over the blocks of p50 against p50, its 10–90 % range
-in brackets. Trust ratios; microseconds belong to the machine, which a fixed numpy kernel (a 64 × 64 product and its
-Cholesky factor) describes under each part. Nothing here is asserted by a test.
+Written by `make bench`: every number below was measured by the command over it, peers and this project alternating
+block by block in one run, the same answer checked first. A ratio is the median over the blocks of p50 against p50, its
+10–90 % range in brackets. Trust ratios; microseconds belong to the machine, which a fixed numpy kernel (a 64 × 64
+product and its Cholesky factor) describes under each part. Nothing here is asserted by a test.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,12 @@ BLOCKS, STEPS = 6, 15
 COST_TOLERANCE = 1e-6  # of 1 + |optimum|
 STATE_TOLERANCE = 1e-3  # of 1 + the largest |x|
 ROW_TOLERANCE = 1e-5  # by which a hard row may be missed
-NOTE = f"""Each instance is a sequence: its gradient trembles by 0.1 % from step to step, and every solver starts from its own last
-answer as far as it can. Matrices are handed over at every step, but for stage 1, whose matrices never change. Solvers run in
-turns of {STEPS} steps in one interpreter. The optimum is daqp's; the check is the cost of x with its soft rows within
-{COST_TOLERANCE:g} of it, x within {STATE_TOLERANCE:g} and hard rows within {ROW_TOLERANCE:g}. *missed*: an answer beyond one of these,
-*unsolved*: none in part of the steps. `qpsolvers: …` is what a first version would do: the same solver behind the wrapper,
-set up anew at every solve."""
+NOTE = f"""Each instance is a sequence: its gradient trembles by 0.1 % from step to step, and every solver starts from
+its own last answer as far as it can. Matrices are handed over at every step, but for stage 1, whose matrices never
+change. Solvers run in turns of {STEPS} steps in one interpreter. The optimum is daqp's; the check is the cost of x
+with its soft rows within {COST_TOLERANCE:g} of it, x within {STATE_TOLERANCE:g} and hard rows within
+{ROW_TOLERANCE:g}. *missed*: an answer beyond one of these, *unsolved*: none in part of the steps. `qpsolvers: …` is
+what a first version would do: the same solver behind the wrapper, set up anew at every solve."""
 
 
 def verdict(answer: dict[str, Any]) -> str:
@@ -48,8 +49,8 @@ def measure() -> Section:
         title = f"{name}: {family['variables']} variables, {family['rows']} rows"
         table = Table(("solver", "p50, µs", "p99, µs", "× daqp", "optimum", "error of x"), title=title)
         solvers = family["solvers"]
-        for solver, answer in sorted(solvers.items(), key=lambda item: np.median(sum(item[1]["blocks"], [np.inf]))):
-            seconds = sum(answer["blocks"], [])
+        for solver, answer in sorted(solvers.items(), key=lambda item: _median(item[1])):
+            seconds = list(chain(*answer["blocks"]))
             table.rows.append(
                 (
                     solver,
@@ -61,3 +62,8 @@ def measure() -> Section:
             )
         tables.append(table)
     return Section("stages", "Stages 1 and 2 on other QP solvers", tables, [NOTE])
+
+
+def _median(answer: dict[str, Any]) -> float:
+    seconds = list(chain(*answer["blocks"]))
+    return float(np.median(seconds)) if seconds else np.inf

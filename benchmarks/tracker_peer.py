@@ -1,7 +1,7 @@
 """The tracker against TSID, C++ task-space inverse dynamics, on the same robot, states, tasks, weights and limits.
 
-Three times one QP a tick: the tracker as shipped, the tracker on TSID's tasks, and TSID, which runs in an interpreter of
-its own (benchmarks/tsid_server.py). Blocks of consecutive ticks alternate, so that all see the same machine.
+Three times one QP a tick: the tracker as shipped, the tracker on TSID's tasks, and TSID, which runs in an interpreter
+of its own (benchmarks/tsid_server.py). Blocks of consecutive ticks alternate, so that all see the same machine.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ MATCHED = TrackerSettings(
 
 SHIPPED, MATCHING = "tracker, as shipped", "tracker, TSID's tasks"
 FORMULATIONS = {"TSID, contacts as costs": "costs", "TSID, contacts as equations": "equations"}
-NOTE = """{ticks} consecutive ticks of `reach` with both feet and a braced palm in contact. TSID 1.7.1 with Pinocchio 3.4 and
-eiquadprog-fast, {sizes}; its times are taken inside of its own interpreter: references set from Python, problem data
-computed, solved. Ours are those of `Tracker.solve`, everything from the state to the torques. On TSID's tasks the tracker's rows of comfort, clearance and
-keep-out are still there and do not bind; integrals, clips and filters are off.
-Tolerance: {tolerance:g} of the accelerations' norm. With contacts as costs both solve the same QP but for the soles' yaw
-moment: corner forces bound it by where the pressure is, wrench rows by a radius. It shows where the pressure is at an
-edge; where all corners press, the answers are equal. Contacts as equations, the way of TSID's examples, have no compliance
-and so another optimum."""
+NOTE = """{ticks} consecutive ticks of `reach` with both feet and a braced palm in contact. TSID 1.7.1 with Pinocchio
+3.4 and eiquadprog-fast, {sizes}; its times are taken inside of its own interpreter: references set from Python,
+problem data computed, solved. Ours are those of `Tracker.solve`, everything from the state to the torques. On TSID's
+tasks the tracker's rows of comfort, clearance and keep-out are still there and do not bind; integrals, clips and
+filters are off. Tolerance: {tolerance:g} of the accelerations' norm. With contacts as costs both solve the same QP but
+for the soles' yaw moment: corner forces bound it by where the pressure is, wrench rows by a radius. It shows where the
+pressure is at an edge; where all corners press, the answers are equal. Contacts as equations, the way of TSID's
+examples, have no compliance and so another optimum."""
 
 
 def arrays(ticks: Ticks, settings: TrackerSettings) -> dict[str, Any]:
@@ -200,7 +200,9 @@ def measure() -> Section:
         )
     ours = np.array([command.acceleration for command in commands[MATCHING]])
     flat = theirs["least_corner"] > PRESSED
-    answers = Table(("accelerations against the tracker on TSID's tasks", "ticks", "p50", "largest", "within tolerance"))
+    answers = Table(
+        ("accelerations against the tracker on TSID's tasks", "ticks", "p50", "largest", "within tolerance")
+    )
     for name, formulation in FORMULATIONS.items():
         error = np.linalg.norm(theirs[formulation] - ours, axis=1) / np.linalg.norm(ours, axis=1)
         for which, those in ((name, error), (f"{name}, all corners pressing", error[flat])):
@@ -210,5 +212,8 @@ def measure() -> Section:
                 answers.rows.append(row)
     sizes = "{variables} variables, {equalities} equations, {rows} inequalities".format(**server.sizes)
     return Section(
-        "tracker", "The tracker against TSID", [times, answers], [NOTE.format(sizes=sizes, ticks=len(ticks.states), tolerance=TOLERANCE)]
+        "tracker",
+        "The tracker against TSID",
+        [times, answers],
+        [NOTE.format(sizes=sizes, ticks=len(ticks.states), tolerance=TOLERANCE)],
     )
