@@ -44,7 +44,7 @@ pictures: setup
 # All benchmarks, peers included, into docs/benchmarks.md and docs/profile.md; one of them: PARTS=tracker.
 PARTS ?=
 bench: setup peers
-	$(BIN)/python -m benchmarks $(PARTS) --write docs/benchmarks.md
+	$(BIN)/python -m benchmarks $(PARTS) --write docs
 
 setup: $(STAMP)
 

@@ -1,6 +1,6 @@
 """Measure, print, and write down.
 
-    python -m benchmarks [PART ...] [--write docs/benchmarks.md]
+    python -m benchmarks [PART ...] [--write docs]
 
 Without parts, all of them. Nothing here is a threshold: the numbers are the machine's. Trust the ratios, of blocks
 that alternate within one run, and compare absolute times with the yardstick only, a fixed numpy kernel timed before
@@ -36,7 +36,7 @@ def main() -> None:
     """Run the parts that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measure, print, and write down.")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} [all]")
-    parser.add_argument("--write", type=Path, metavar="FILE", help="replace the sections of these parts in FILE")
+    parser.add_argument("--write", type=Path, metavar="DOCS", help="replace the sections of these parts in this folder")
     arguments = parser.parse_args()
     if unknown := [part for part in arguments.parts if part not in PARTS]:
         parser.error(f"no such part: {', '.join(unknown)} (choices: {', '.join(PARTS)})")

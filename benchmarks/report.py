@@ -36,7 +36,8 @@ class Section:
     title: str
     tables: list[Table] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)  # paragraphs: what was compared, what differs, what it means
-    pictures: list[str] = field(default_factory=list)  # file names in docs/pictures
+    pictures: dict[str, str] = field(default_factory=dict)  # SVG by file name
+    document: str = "benchmarks.md"  # in docs/
 
     def show(self, console: Console) -> None:
         """Print it."""
@@ -65,14 +66,18 @@ class Section:
         return "\n".join([*lines, f"*{footer}*", ""])
 
 
-def write(path: Path, section: Section, footer: str) -> None:
-    """Put the section in the place of its last measurement in the file, a new one at the end."""
-    text = path.read_text(encoding="utf-8") if path.exists() else HEAD
+def write(docs: Path, section: Section, footer: str) -> None:
+    """Put the section in the place of its last measurement in its document, a new one at the end; and its pictures."""
+    path = docs / section.document
+    text = path.read_text(encoding="utf-8") if path.exists() else HEADS[section.document]
     begin, end = MARK.format(section.part), MARK.format(f"end of {section.part}")
     block = f"{begin}\n{section.markdown(footer)}{end}\n"
     pattern = re.compile(f"{re.escape(begin)}\n.*?{re.escape(end)}\n", re.DOTALL)
     text = pattern.sub(lambda _: block, text) if pattern.search(text) else f"{text}\n{block}"
     path.write_text(text, encoding="utf-8")
+    for name, picture in section.pictures.items():
+        (docs / "pictures").mkdir(exist_ok=True)
+        (docs / "pictures" / name).write_text(picture, encoding="utf-8")
 
 
 def machine() -> str:
@@ -107,10 +112,16 @@ def _row(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-HEAD = """# Benchmarks
+HEADS = {
+    "benchmarks.md": """# Benchmarks
 
 Written by `make bench`: every number below was measured by the command over it, peers and this project alternating
 block by block in one run, the same answer checked first. A ratio is the median over the blocks of p50 against p50, its
 10–90 % range in brackets. Trust ratios; microseconds belong to the machine, which a fixed numpy kernel (a 64 × 64
 product and its Cholesky factor) describes under each part. Nothing here is asserted by a test.
-"""
+""",
+    "profile.md": """# Profile
+
+Where one simulated second of `reach` goes, function by function; written by `make bench PARTS=profile`.
+""",
+}
