@@ -32,7 +32,8 @@ def flame_graph(stacks: Counter[Stack]) -> str:
     boxes = list(_boxes(root, 0.0, 0, root.count))
     height = ROW * (1 + max((depth for _, _, depth, _ in boxes), default=0))
     lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" font-family="monospace" font-size="10.5">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}"',
+        ' font-family="monospace" font-size="10.5">',
         f'<rect width="{WIDTH}" height="{height}" fill="#ffffff"/>',
     ]
     for name, left, depth, share in boxes:

@@ -23,7 +23,9 @@ def with_chain(robot: Robot, links: int, folder: Path) -> Robot:
     tree = ElementTree.parse(robot.path)
     root = tree.getroot()
     body, motors, key = root.find(".//body[@name='torso']"), root.find("actuator"), root.find(".//key[@name='home']")
-    assert body is not None and motors is not None and key is not None
+    assert body is not None
+    assert motors is not None
+    assert key is not None
     for i in range(links):
         body = ElementTree.SubElement(body, "body", name=f"chain_{i}", pos="-0.06 0 0.1" if i == 0 else f"{-LINK} 0 0")
         ElementTree.SubElement(body, "inertial", mass="0.001", pos="0 0 0", diaginertia="1e-7 1e-7 1e-7")

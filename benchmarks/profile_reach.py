@@ -27,8 +27,9 @@ BEGIN, END = 8.0, 9.0  # [s] of `reach`: leaning on its hand, all three stages a
 INTERVAL = 2e-4  # [s] of wall time between two looks at the stack
 ROOT = "wbmpc.loop.run_lockstep"
 SHOWN = 40  # functions in the table
-NOTE = f"""From {BEGIN:g} to {END:g} s of a lockstep run without a recording. *own*: the stack ended in this function or in the C
-code that it called (numpy, Pinocchio, MuJoCo, a QP solver); *with callees*: the function was on the stack."""
+NOTE = f"""From {BEGIN:g} to {END:g} s of a lockstep run without a recording. *own*: the stack ended in this function
+or in the C code that it called (numpy, Pinocchio, MuJoCo, a QP solver); *with callees*: the function was on the
+stack."""
 
 
 class Sampler:
