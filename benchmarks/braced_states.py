@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.replaced import replaced
 from wbmpc.loop import run_lockstep
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
@@ -51,29 +52,22 @@ def record() -> Ticks:
     robot, step = Robot.load(robot_path(scenario)), scenario.loop.timestep
     recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
     ticks = Ticks(robot, step, [], [])
-    with _listening(ticks), suppress(_Enough):
+
+    def listening(solve: Callable[..., TorqueCommand]) -> Callable[..., TorqueCommand]:
+        def listen(tracker: Tracker, state: RobotState, setpoint: Setpoint) -> TorqueCommand:
+            tick = round(state.time / step)
+            if any(0 <= tick - round(start / step) < TICKS for start in STARTS):
+                ticks.states.append(deepcopy(state))
+                ticks.setpoints.append(deepcopy(setpoint))
+            elif tick > STARTS[-1] / step:
+                raise _Enough
+            return solve(tracker, state, setpoint)
+
+        return listen
+
+    with replaced(Tracker, "solve", listening), suppress(_Enough):
         run_lockstep(scenario, robot=robot, recorder=recorder)
     return ticks
-
-
-@contextmanager
-def _listening(ticks: Ticks) -> Iterator[None]:
-    solve = Tracker.solve
-
-    def listen(tracker: Tracker, state: RobotState, setpoint: Setpoint) -> TorqueCommand:
-        tick = round(state.time / ticks.step)
-        if any(0 <= tick - round(start / ticks.step) < TICKS for start in STARTS):
-            ticks.states.append(deepcopy(state))
-            ticks.setpoints.append(deepcopy(setpoint))
-        elif state.time > STARTS[-1] + TICKS * ticks.step:
-            raise _Enough
-        return solve(tracker, state, setpoint)
-
-    Tracker.solve = listen  # type: ignore[method-assign]
-    try:
-        yield
-    finally:
-        Tracker.solve = solve  # type: ignore[method-assign]
 
 
 def plain(ticks: Ticks) -> Ticks:

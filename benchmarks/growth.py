@@ -7,7 +7,6 @@ All sizes take turns, block by block, on the same snapshots and ticks.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,8 +38,8 @@ STAGES = {
 NOTE = """Knots are 0.1 s apart for every N: a longer horizon, not a finer one. The snapshots are the first second of
 `reach`, in which its contact is needed and chosen; stage 2 is both of its solves, assembly included. Joints beyond 23
 are a chain of one-gram links on the robot's back, because a real arm with wrists would be another robot with other
-motions: the ticks are those of `reach` while a hand braces, the chain rests. Exponents are fitted to the p50s by least
-squares over all sizes."""
+motions: the ticks are those of `reach` while a hand braces, the chain rests. Exponents are fitted to the p50s of the
+larger half of the sizes: below, what does not grow hides what does."""
 
 
 def horizons() -> dict[str, dict[int, list[list[float]]]]:
@@ -101,12 +100,13 @@ def _filled(table: Table, blocks: dict[int, list[list[float]]], usual: int) -> T
 
 
 def plot(curves: dict[str, dict[int, list[list[float]]]], label: str) -> str:
-    """p50 against size on logarithmic axes, p10 to p90 as bands, with the fitted exponents: an SVG."""
+    """p50 against size on logarithmic axes, p10 to p90 as bands, with exponents fitted to the larger half: an SVG."""
     figure, axes = pyplot.subplots(figsize=(5.2, 3.4), layout="constrained")
     for name, blocks in curves.items():
         sizes = list(blocks)
         low, middle, high = np.array([_percentiles(np.concatenate(blocks[size])) for size in sizes]).T
-        exponent = np.polyfit(np.log(sizes), np.log(middle), 1)[0]
+        larger = slice(len(sizes) // 2, None)
+        exponent = np.polyfit(np.log(sizes[larger]), np.log(middle[larger]), 1)[0]
         (line,) = axes.loglog(sizes, middle, marker="o", markersize=3, label=f"{name}: exponent {exponent:.1f}")
         axes.fill_between(sizes, low, high, color=line.get_color(), alpha=0.15, linewidth=0)
     axes.set_xticks(sizes, [str(size) for size in sizes])
@@ -120,5 +120,5 @@ def plot(curves: dict[str, dict[int, list[list[float]]]], label: str) -> str:
     return text.getvalue()
 
 
-def _percentiles(seconds: Sequence[float]) -> np.ndarray:
+def _percentiles(seconds: np.ndarray) -> np.ndarray:
     return 1e3 * np.percentile(seconds, [10, 50, 90])

@@ -58,7 +58,7 @@ class Hpipm:
         row_lower, row_upper = p.lower[self._rows], p.upper[self._rows]
         equations = np.vstack([p.matrix[self._equal], self._units])
         values = np.concatenate([p.lower[self._equal], p.x_lower[self._fixed]])
-        arrays = (
+        arrays: tuple[np.ndarray, ...] = (
             *(p.hessian, p.gradient, equations, values),
             *(self._bounded, _finite(lower), _finite(upper)),
             *(p.matrix[self._rows], _finite(row_lower), _finite(row_upper)),

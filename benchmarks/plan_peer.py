@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from copy import deepcopy
 from pathlib import Path
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from benchmarks.braced_states import REACH
 from benchmarks.qp_families import silent
+from benchmarks.replaced import replaced
 from benchmarks.report import Section, Table, micro, ratio
 from wbmpc.initial import initial_posture
 from wbmpc.loop import no_garbage_collection, run_lockstep
+from wbmpc.planner.plan import Plan
 from wbmpc.planner.planner import Planner
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
@@ -45,26 +47,19 @@ def snapshots(scenario: Scenario, robot: Robot, count: int) -> list[RobotState]:
     """The first states that a lockstep run hands to its planner."""
     states: list[RobotState] = []
     recorder = Recorder(robot, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
-    with _listening(states, count), suppress(_Enough):
+
+    def listening(solve: Callable[..., Plan]) -> Callable[..., Plan]:
+        def listen(planner: Planner, state: RobotState) -> Plan:
+            if len(states) == count:
+                raise _Enough
+            states.append(deepcopy(state))
+            return solve(planner, state)
+
+        return listen
+
+    with replaced(Planner, "solve", listening), suppress(_Enough):
         run_lockstep(scenario, robot=robot, recorder=recorder)
     return states
-
-
-@contextmanager
-def _listening(states: list[RobotState], count: int) -> Iterator[None]:
-    solve = Planner.solve
-
-    def listen(planner: Planner, state: RobotState):  # type: ignore[no-untyped-def]
-        if len(states) == count:
-            raise _Enough
-        states.append(deepcopy(state))
-        return solve(planner, state)
-
-    Planner.solve = listen  # type: ignore[method-assign]
-    try:
-        yield
-    finally:
-        Planner.solve = solve  # type: ignore[method-assign]
 
 
 def planner(scenario: Scenario, robot: Robot) -> Planner:

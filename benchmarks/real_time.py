@@ -6,13 +6,14 @@ python -m benchmarks realtime
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from benchmarks.replaced import replaced
 from benchmarks.report import Section, Table
 from benchmarks.stopwatch import timed
 from wbmpc.loop import LoopTiming
@@ -34,19 +35,13 @@ late. *One fixed plan* is the same loop whose planner thread is asked for nothin
 machine and the tick itself miss."""
 
 
-@contextmanager
-def idle_planner() -> Iterator[None]:
-    """No snapshot reaches the planner's thread: the loop follows its first plan."""
-    request = PlannerThread.request
+def idle_planner() -> AbstractContextManager[None]:
+    """Inside, no snapshot reaches the planner's thread: the loop follows its first plan."""
 
     def ignore(thread: PlannerThread, snapshot: RobotState) -> None:
         """Nothing is asked for."""
 
-    PlannerThread.request = ignore  # type: ignore[method-assign]
-    try:
-        yield
-    finally:
-        PlannerThread.request = request  # type: ignore[method-assign]
+    return replaced(PlannerThread, "request", lambda request: ignore)
 
 
 def lockstep(name: str) -> tuple[Table, bool]:
@@ -84,7 +79,10 @@ def measure() -> Section:
     """Lockstep first, then the wall clock."""
     tables, same = zip(*(lockstep(name) for name in LOCKSTEP), strict=True)
     table = Table((f"wall clock, {WALL_CLOCK}", "missed ticks", "worst run", "late plans", "skipped", "drift, ms"))
-    kinds = {"with the planner": nullcontext, "one fixed plan": idle_planner}
+    kinds: dict[str, Callable[[], AbstractContextManager[None]]] = {
+        "with the planner": nullcontext,
+        "one fixed plan": idle_planner,
+    }
     timings: dict[str, list[LoopTiming]] = {kind: [] for kind in kinds}
     for _ in range(ROUNDS):
         for kind, planner in kinds.items():

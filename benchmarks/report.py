@@ -89,7 +89,7 @@ def machine() -> str:
     return f"{model}, {os.cpu_count()} cores, Python {platform.python_version()}"
 
 
-def micro(seconds: Sequence[float], percentile: float) -> str:
+def micro(seconds: Sequence[float] | np.ndarray, percentile: float) -> str:
     """A percentile of `seconds` in µs."""
     value = 1e6 * float(np.percentile(seconds, percentile))
     return f"{value:.0f}" if value >= 10.0 else f"{value:.1f}"

@@ -46,7 +46,7 @@ def report_run(name: str) -> Table:
         recorder = run_scenario(scenario, name=name, recording=Path(folder) / f"{name}.rrd").recorder
     table = Table((f"{name}, wall times in ms", "p50", "p99", "max", "calls"))
 
-    def row(label: str, seconds: Sequence[float]) -> None:
+    def row(label: str, seconds: Sequence[float] | np.ndarray) -> None:
         numbers = 1e3 * np.percentile(seconds, [50, 99, 100]) if len(seconds) else ()
         table.rows.append((label, *(f"{x:.3f}" for x in numbers), *[""] * (3 - len(numbers)), str(len(seconds))))
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report import Section, Table, micro, ratio
-from benchmarks.tracker_peer import PEERS, ROOT
+from benchmarks.tsid_client import ROOT, peers_python
 
 BLOCKS, STEPS = 6, 15
 COST_TOLERANCE = 1e-6  # of 1 + |optimum|
@@ -39,11 +39,11 @@ def verdict(answer: dict[str, Any]) -> str:
 def measure() -> Section:
     """Ask the peers' environment, make the tables."""
     instances = sorted((ROOT / "tests" / "qp" / "instances").glob("stage[12]_*.npz"))
-    command = [PEERS, "-m", "benchmarks.stage_server", str(BLOCKS), str(STEPS), *map(str, instances)]
+    command = [peers_python(), "-m", "benchmarks.stage_server", str(BLOCKS), str(STEPS), *map(str, instances)]
     # PIQP warns of every row without bounds, on the standard error
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     if run.returncode:
-        raise RuntimeError(f"the peers' environment failed (`make peers` makes it): {run.stderr[-2000:]}")
+        raise RuntimeError(f"the peers' environment failed: {run.stderr[-2000:]}")
     tables = []
     for name, family in json.loads(run.stdout).items():
         title = f"{name}: {family['variables']} variables, {family['rows']} rows"

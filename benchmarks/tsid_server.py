@@ -2,10 +2,10 @@
 
     .venv-peers/bin/python benchmarks/tsid_server.py MODEL.xml TICKS.npz ANSWER.npz
 
-Started by benchmarks/tsid.py, which says what the arrays of TICKS.npz are. Reads lines `FORMULATION FIRST LAST` from
-standard input, solves these ticks, and answers each line with the seconds of every tick as JSON: references set,
-problem data computed, solved. At the end of the input it writes the accelerations, and the
-normal force of the least loaded corner, to ANSWER.npz.
+Started by benchmarks/tsid_client.py, which says what the arrays of TICKS.npz are. Reads lines `FORMULATION FIRST LAST`
+from standard input, solves these ticks, and answers each line with the seconds of every tick as JSON: references set,
+problem data computed, solved. At the end of the input it writes the accelerations, and the normal force of the least
+loaded corner, to ANSWER.npz.
 """
 
 from __future__ import annotations
