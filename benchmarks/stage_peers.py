@@ -20,9 +20,9 @@ NOTE = f"""Each instance is a sequence: its gradient trembles by 0.1 % from step
 its own last answer as far as it can. Matrices are handed over at every step, but for stage 1, whose matrices never
 change. Solvers run in turns of {STEPS} steps in one interpreter. The optimum is daqp's; the check is the cost of x
 with its soft rows within {COST_TOLERANCE:g} of it, x within {STATE_TOLERANCE:g} and hard rows within
-{ROW_TOLERANCE:g}. *missed*: an answer beyond one of these, *unsolved*: none in part of the steps. `qpsolvers: …` is what a first version would do: the same solver behind
-the wrapper, set up anew at every solve, with a slack variable for every soft row. The direct APIs get no rows without
-bounds."""
+{ROW_TOLERANCE:g}. *missed*: an answer beyond one of these, *unsolved*: none in part of the steps. `qpsolvers: …` is
+what a first version would do: the same solver behind the wrapper, set up anew at every solve, with a slack variable
+for every soft row. The direct APIs get no rows without bounds."""
 
 
 def verdict(answer: dict[str, Any]) -> str:
