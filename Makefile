@@ -1,6 +1,7 @@
 # Everything a newcomer needs: `make run`, `make test`. Needs Python 3.11, git, make and gcc.
 PYTHON ?= python3
 VENV := .venv
+PEERS := .venv-peers
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.synced
 OUT ?= out
@@ -11,7 +12,7 @@ TEST_ARGS ?=
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test lint format types scenarios pictures bench lock setup clean
+.PHONY: run test lint format types scenarios pictures bench peers lock setup clean
 .DELETE_ON_ERROR:
 
 run: setup
@@ -40,8 +41,10 @@ pictures: setup
 	$(BIN)/wbmpc plot $(patsubst scenarios/%.yaml,$(OUT)/%.rrd,$(wildcard scenarios/*.yaml)) --out docs/pictures
 	$(BIN)/python docs/scenarios_page.py
 
-bench: setup
-	$(BIN)/python -m benchmarks
+# All benchmarks, peers included, into docs/benchmarks.md and docs/profile.md; one of them: PARTS=tracker.
+PARTS ?=
+bench: setup peers
+	$(BIN)/python -m benchmarks $(PARTS) --write docs
 
 setup: $(STAMP)
 
@@ -56,14 +59,24 @@ $(STAMP): requirements/dev.txt pyproject.toml
 	@$(BIN)/python -m wbmpc.warm_up
 	@touch $@
 
-UV_LOCK = $(BIN)/uv pip compile pyproject.toml --quiet $(UPGRADE) --generate-hashes --no-emit-index-url \
+# The peers of the benchmarks, in an environment of their own: TSID's Pinocchio is not ours.
+peers: $(PEERS)/.synced
+
+$(PEERS)/.synced: requirements/peers.txt $(STAMP)
+	@echo "setting up $(PEERS) (once)"
+	@test -x $(PEERS)/bin/python || $(BIN)/uv venv --quiet --python $(BIN)/python $(PEERS)
+	@VIRTUAL_ENV=$(CURDIR)/$(PEERS) $(BIN)/uv pip sync --quiet --require-hashes --only-binary :all: requirements/peers.txt
+	@touch $@
+
+UV_LOCK = $(BIN)/uv pip compile --quiet $(UPGRADE) --generate-hashes --no-emit-index-url \
 	--python-version 3.11 --custom-compile-command "make lock"
 
 # Keeps the pinned versions that still fit; `make lock UPGRADE=--upgrade` takes the newest.
 lock: setup
-	$(UV_LOCK) --output-file requirements/run.txt
-	$(UV_LOCK) --group dev --output-file requirements/dev.txt
+	$(UV_LOCK) pyproject.toml --output-file requirements/run.txt
+	$(UV_LOCK) pyproject.toml --group dev --output-file requirements/dev.txt
+	$(UV_LOCK) requirements/peers.in --output-file requirements/peers.txt
 
 clean:
-	rm -rf $(OUT) $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(OUT) $(VENV) $(PEERS) .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,148 +1,55 @@
-"""Where the time of a run goes.
+"""Measure, print, and write down.
 
-    python -m benchmarks [--scenarios stand,reach]
+    python -m benchmarks [PART ...] [--write docs]
 
-One lockstep run of each scenario with a recording and one without, then the recorded QPs on every backend. Nothing
-here is a threshold: the numbers are the machine's. Compare them with the yardstick, a fixed numpy kernel timed before
-and after, and trust ratios within one run more than milliseconds.
+Without parts, all of them. Nothing here is a threshold: the numbers are the machine's. Trust the ratios, of blocks
+that alternate within one run, and compare absolute times with the yardstick only, a fixed numpy kernel timed before
+and after each part. `tracker` and `stages` need the peers' environment (`make peers`).
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
-import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
-from benchmarks.qp_backends import measure, recorded
-from benchmarks.stopwatch import timed, yardstick
-from benchmarks.taps import tapped
-from wbmpc.estimator import Estimator
-from wbmpc.planner.contact_sets import ContactSets
-from wbmpc.planner.knot_forces import KnotForces
-from wbmpc.plant import Plant
-from wbmpc.qp import MIQP_BACKENDS
-from wbmpc.qp.workspace import qp_backend_names
-from wbmpc.recorder import Recorder
-from wbmpc.rerun_sink import RerunSink
-from wbmpc.scenario import load_scenario
-from wbmpc.session import run_scenario
-from wbmpc.signals import SolveStatus
+from benchmarks.report import Section, machine, write
+from benchmarks.stopwatch import yardstick
 
-ROOT = Path(__file__).parents[1]
-TICK_PARTS = (
-    ("sensors", Plant, "measure"),
-    ("estimator", Estimator, "update"),
-    ("physics and truth", Plant, "step"),
-    ("recorder", Recorder, "append"),
-)
-STAGE_3 = (  # which solves without workspaces, which could be tapped
-    ("  stage 3: choice at firing", ContactSets, "solve"),
-    ("  stage 3: forces", KnotForces, "solve"),
-)
-QPS = {  # the QPs inside the stages, by tap, or by the class that made several (benchmarks/taps.py)
-    "ComHeightStage 1": "  stage 1: QP",
-    "HorizontalMotion": "  stage 2: QPs of the CoM",
-    "JointVelocities 1": "  stage 2: QP of the joints",
-    "Tracker 1": "  tracker: QP",
+PARTS = {  # name on the command line: module with `measure() -> Section`, imported when it is its turn
+    "tracker": "tracker_peer",
+    "stages": "stage_peers",
+    "plan": "plan_peer",
+    "growth": "growth",
+    "realtime": "real_time",
+    "memory": "memory",
+    "runs": "runs",
+    "backends": "backend_table",
+    "profile": "profile_reach",
 }
-STEPS = 60  # solves of each backend on each recorded QP
-
-
-def _row(table: Table, name: str, seconds: Sequence[float]) -> None:
-    if not len(seconds):
-        table.add_row(name, "-", "-", "-", "0")
-        return
-    p50, p99, most = 1e3 * np.percentile(seconds, [50, 99, 100])
-    table.add_row(name, f"{p50:.3f}", f"{p99:.3f}", f"{most:.3f}", str(len(seconds)))
-
-
-def report_run(console: Console, name: str) -> None:
-    """Times of one scenario, stage by stage, and how fast it ran with a recording and without."""
-    path = ROOT / "scenarios" / f"{name}.yaml"
-    methods = [(owner, method) for _, owner, method in (*TICK_PARTS, *STAGE_3)]
-    with TemporaryDirectory() as folder, tapped() as taps, timed(*methods, (RerunSink, "flush")) as parts:
-        result = run_scenario(load_scenario(path), name=name, recording=Path(folder) / f"{name}.rrd")
-    bare = run_scenario(load_scenario(path), name=name)
-
-    recorder, flushes = result.recorder, parts[-1]
-    table = Table(title=f"{name}: wall times in ms", title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
-    table.add_column("", no_wrap=True)
-    for header in ("p50", "p99", "max", "calls"):
-        table.add_column(header, justify="right")
-    _row(table, "tracker tick (1 kHz)", recorder.command_solve_time)
-    _row(table, QPS["Tracker 1"], taps["Tracker 1"].seconds)
-    for (part, _, _), seconds in zip(TICK_PARTS, parts, strict=False):
-        _row(table, part, seconds)
-    _row(table, "recording flushed (2 Hz)", flushes)
-    _row(table, "whole plan (100 Hz)", [plan.plan_time for plan in recorder.plans])
-    for stage in ("stage1", "stage2", "stage3"):
-        ran = [r for plan in recorder.plans if (r := getattr(plan, stage)).status != SolveStatus.NOT_RUN]
-        _row(table, f"stage {stage[-1]}", [report.solve_time for report in ran])
-        for label, title in QPS.items():
-            if title.startswith(f"  stage {stage[-1]}"):
-                solves = [s for tap in taps.values() if label in (tap.label, tap.maker) for s in tap.seconds]
-                _row(table, title, solves)
-    for (part, _, _), seconds in zip(STAGE_3, parts[len(TICK_PARTS) :], strict=False):
-        _row(table, part, seconds)
-    console.print(table)
-    ticks = len(recorder.command_solve_time)
-    console.print(f"recording: {1e6 * (sum(parts[3]) + sum(flushes)) / ticks:.1f} µs a tick, flushes included")
-    factors = [run.verdict.real_time_factor for run in (result, bare)]
-    console.print(f"lockstep real-time factor: {factors[0]:.2f} with a recording, {factors[1]:.2f} without")
-    same = result.verdict.state_sha256 == bare.verdict.state_sha256
-    console.print(f"same motion in both, bit for bit: {'yes' if same else 'NO'}\n")
-
-
-def report_backends(console: Console) -> None:
-    """The default backend on the recorded QPs, and every other as a multiple of it."""
-    native = [name for name in qp_backend_names() if name != "daqp"]
-    table = Table(
-        title="recorded QPs, warm-started: p50, the others as multiples of it",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-    )
-    for header in ("problem", "variables × rows", "daqp, ms", *native, "highs (MIQP)"):
-        left = header == "problem"
-        table.add_column(header.replace(":", ":\n"), justify="left" if left else "right", no_wrap=left)
-    for path in sorted((ROOT / "tests" / "qp" / "instances").glob("*.npz")):
-        family = recorded(path)
-        mixed = bool(family.problem.binary.size)
-        results = measure(family, list(MIQP_BACKENDS) if mixed else ["daqp", *native], STEPS)
-        reference = float(np.median(results["daqp"].seconds))
-        cells = []
-        for name in (*native, "highs"):
-            if name not in results:
-                cells.append("")
-            elif results[name].failures and not results["daqp"].failures:
-                cells.append("refused")
-            else:
-                cells.append(f"{float(np.median(results[name].seconds)) / reference:.1f}")
-        size = f"{family.problem.variables} × {family.problem.rows}"
-        table.add_row(path.stem, size, f"{1e3 * reference:.3f}", *cells)
-    console.print(table)
 
 
 def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description="Where the time of a run goes.")
-    parser.add_argument("--scenarios", default="stand,reach", help="comma-separated names")
-    names = parser.parse_args().scenarios.split(",")
-    console = Console(width=110, highlight=False)
-    before = yardstick()
-    for name in names:
-        report_run(console, name)
-    report_backends(console)
-    after = yardstick()
-    console.print(
-        f"yardstick (64 × 64 product and Cholesky), p50: {1e6 * before:.0f} µs before, {1e6 * after:.0f} after"
-    )
+    """Run the parts that the command line names."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measure, print, and write down.")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"of {', '.join(PARTS)} [all]")
+    parser.add_argument("--write", type=Path, metavar="DOCS", help="replace the sections of these parts in this folder")
+    arguments = parser.parse_args()
+    if unknown := [part for part in arguments.parts if part not in PARTS]:
+        parser.error(f"no such part: {', '.join(unknown)} (choices: {', '.join(PARTS)})")
+    console = Console(width=120, highlight=False)
+    for part in arguments.parts or PARTS:
+        measure: Callable[[], Section] = import_module(f"benchmarks.{PARTS[part]}").measure
+        before = yardstick()
+        section = measure()
+        footer = f"{machine()}; yardstick {1e6 * before:.0f} µs before, {1e6 * yardstick():.0f} µs after"
+        section.show(console)
+        console.print(footer)
+        if arguments.write:
+            write(arguments.write, section, footer)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,106 @@
+"""The whole loop against real time: lockstep with and without a recording, and the wall clock with and without a
+planner.
+
+python -m benchmarks realtime
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.replaced import replaced
+from benchmarks.report import Section, Table
+from benchmarks.stopwatch import timed
+from wbmpc.loop import LoopTiming
+from wbmpc.realtime import PlannerThread, run_realtime
+from wbmpc.recorder import Recorder
+from wbmpc.rerun_sink import RerunSink
+from wbmpc.robot import Robot
+from wbmpc.scenario import load_scenario, robot_path
+from wbmpc.session import run_scenario
+from wbmpc.signals import RobotState
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
+ROUNDS = 3  # of every kind of run, in turn
+LOCKSTEP = ("stand", "reach")
+WALL_CLOCK = "stand"  # the scenario that needs no second plan
+NOTE = """Lockstep: simulated over wall time, above 1 is faster than real time. Recording: what `Recorder.append` and
+the flushes of the `.rrd` take. Wall clock: ticks that began more than a timestep late, and by how much the run ended
+late. *One fixed plan* is the same loop whose planner thread is asked for nothing after the first plan: what the
+machine and the tick itself miss."""
+
+
+def idle_planner() -> AbstractContextManager[None]:
+    """Inside, no snapshot reaches the planner's thread: the loop follows its first plan."""
+
+    def ignore(thread: PlannerThread, snapshot: RobotState) -> None:
+        """Nothing is asked for."""
+
+    return replaced(PlannerThread, "request", lambda request: ignore)
+
+
+def lockstep(name: str) -> tuple[Table, bool]:
+    """Runs with and without a recording in turn; whether all of them moved alike, bit for bit."""
+    factors: dict[str, list[float]] = {"with a recording": [], "without": []}
+    costs, hashes = [], set()
+    for _ in range(ROUNDS):
+        for kind, kept in factors.items():
+            scenario = load_scenario(SCENARIOS / f"{name}.yaml")
+            with (
+                TemporaryDirectory() as folder,
+                timed((Recorder, "append"), (RerunSink, "flush")) as (appends, flushes),
+            ):
+                recording = Path(folder) / "run.rrd" if kind == "with a recording" else None
+                verdict = run_scenario(scenario, name=name, recording=recording).verdict
+            kept.append(verdict.real_time_factor)
+            hashes.add(verdict.state_sha256)
+            costs += [1e6 * (sum(appends) + sum(flushes)) / len(appends)] if recording else []
+    table = Table((f"lockstep, {name}", "real-time factor, p50", "least", "most", "recording, µs a tick"))
+    for kind, values in factors.items():
+        cost = f"{np.median(costs):.1f}" if kind == "with a recording" else ""
+        table.rows.append((kind, f"{np.median(values):.2f}", f"{min(values):.2f}", f"{max(values):.2f}", cost))
+    return table, len(hashes) == 1
+
+
+def wall_clock(name: str) -> LoopTiming:
+    """One `--realtime` run of a shipped scenario, not recorded to a file."""
+    scenario = load_scenario(SCENARIOS / f"{name}.yaml")
+    robot = Robot.load(robot_path(scenario))
+    ticks = round(scenario.duration * scenario.loop.physics_rate)
+    return run_realtime(scenario, robot=robot, recorder=Recorder(robot, expected_ticks=ticks))
+
+
+def measure() -> Section:
+    """Lockstep first, then the wall clock."""
+    tables, same = zip(*(lockstep(name) for name in LOCKSTEP), strict=True)
+    table = Table((f"wall clock, {WALL_CLOCK}", "missed ticks", "worst run", "late plans", "skipped", "drift, ms"))
+    kinds: dict[str, Callable[[], AbstractContextManager[None]]] = {
+        "with the planner": nullcontext,
+        "one fixed plan": idle_planner,
+    }
+    timings: dict[str, list[LoopTiming]] = {kind: [] for kind in kinds}
+    for _ in range(ROUNDS):
+        for kind, planner in kinds.items():
+            with planner():
+                timings[kind].append(wall_clock(WALL_CLOCK))
+    ticks = round(1e3 * timings["with the planner"][0].simulated_time)
+    for kind, runs in timings.items():
+        missed = [run.missed_deadlines for run in runs]
+        late, skipped = (sum(getattr(run, name) for run in runs) for name in ("late_plans", "skipped_plans"))
+        plans = sum(len(run.plan_latency) for run in runs)
+        table.rows.append(
+            (
+                kind,
+                *(f"{100.0 * share / ticks:.2f} %" for share in (np.median(missed), max(missed))),
+                f"{late} of {plans}",
+                str(skipped),
+                f"{1e3 * np.median([run.drift for run in runs]):.1f}",
+            )
+        )
+    bits = f"Same motion with and without a recording, bit for bit: {'yes' if all(same) else 'NO'}."
+    return Section("realtime", "The whole loop against real time", [*tables, table], [NOTE, bits])
