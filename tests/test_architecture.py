@@ -35,7 +35,8 @@ ALLOWED = {
     "settings": BASE | {"settings"},  # every settings.py: what a scenario may write for the package that it stands in
     "scenario": ROBOT | SETTINGS,
     "plant_kernels": BASE | {"plant_kernels"},
-    "plant": ROBOT | SETTINGS | {"plant", "plant_kernels"},  # knows nothing of the controller
+    "physics": {"physics"},
+    "plant": ROBOT | SETTINGS | {"plant", "plant_kernels", "physics"},  # knows nothing of the controller
     "estimator": ROBOT | SETTINGS | {"estimator", "estimator_kernel"},
     "estimator_kernel": ROBOT | {"estimator_kernel"},
     "qp": BASE | {"qp"},

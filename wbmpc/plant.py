@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.physics import Physics
 from wbmpc.plant_kernels import contact_sums, servo_torque
 from wbmpc.robot import Robot
 from wbmpc.scenario import Disturbance, SensorSettings
@@ -35,6 +36,7 @@ class Plant:
         """Place robot, then free objects at `qpos` (nq,), at rest; `seed` fixes all sensor noise."""
         self.model, self._robot, self._sensors = model, robot, sensors
         self.data = mujoco.MjData(model)
+        self._physics = Physics(model, self.data)
         self._step = model.opt.timestep
         self._rng = generator(seed, Stream.SENSOR_NOISE)
         self._noise = _noise_scales(sensors, robot.nj)
@@ -99,20 +101,20 @@ class Plant:
 
     def step(self, torque: Vector) -> Truth:
         """Apply `torque` (nj,) [N·m], clipped to the servo's torque-speed line, for one step; returns what happened."""
-        m, d, robot = self.model, self.data, self._robot
+        d, robot = self.data, self._robot
         time, qpos, qvel = float(d.time), d.qpos.copy(), d.qvel.copy()
         applied, limit = np.empty(robot.nj), np.empty(robot.nj)
         servo_torque(torque, qvel, robot.joint_speed, robot.torque_limit, applied, limit)
         d.ctrl[:] = applied
         external = self._push(time)
-        mujoco.mj_subtreeVel(m, d)
+        self._physics.subtree_velocity()
         com, com_velocity = d.subtree_com[self._root].copy(), d.subtree_linvel[self._root].copy()
         sites = d.site_xpos.take(self._sites, axis=0)
         sole, palm = sites[:2], sites[2:]
         torso_up = float(d.xmat[self._torso, 8])
-        mujoco.mj_step2(m, d)
+        self._physics.step2()
         contacts = self._contacts(sole)
-        mujoco.mj_step1(m, d)
+        self._physics.step1()
         return Truth(
             time=time,
             qpos=qpos,
