@@ -61,12 +61,11 @@ def finished(
     if jobs <= 1:
         yield from ((index, work(item)) for index, item in enumerate(items))
         return
-    one_thread_each()
     todo = list(enumerate(items))[::-1]
-    busy: dict[Connection, _Worker[Item, Result]] = {}
+    busy: dict[Connection, Worker[Item, Result]] = {}
     try:
         for _ in range(jobs):
-            worker = _Worker(work, *todo.pop())
+            worker = Worker(work, *todo.pop())
             busy[worker.connection] = worker
         while busy:
             for ready in wait(list(busy)):
@@ -78,7 +77,7 @@ def finished(
                     del busy[worker.connection]
                     worker.end()
                     if todo:
-                        worker = _Worker(work, *todo.pop())
+                        worker = Worker(work, *todo.pop())
                         busy[worker.connection] = worker
                 yield index, result
     finally:
@@ -86,11 +85,12 @@ def finished(
             worker.end()
 
 
-class _Worker(Generic[Item, Result]):
-    """One process and the item that it works on."""
+class Worker(Generic[Item, Result]):
+    """One process and the item that it works on; what it is given next finds the process as the last item left it."""
 
     def __init__(self, work: Callable[[Item], Result], index: int, item: Item) -> None:
         # Spawned, not forked: solver libraries hold threads and locks that do not survive a fork.
+        one_thread_each()
         context = get_context("spawn")
         self.connection, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)

@@ -8,12 +8,14 @@ from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import perf_counter, sleep
+from typing import Protocol
 
 import mujoco
 
 from wbmpc.loop import FLUSH_TICKS, Session, Sink, no_garbage_collection
 from wbmpc.mailbox import Mailbox
-from wbmpc.planner.planner import Planner
+from wbmpc.planner.plan import Plan
+from wbmpc.planner_process import PlannerProcess
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world
@@ -36,6 +38,9 @@ def run_realtime(
     ended: Callable[[], str | None] | None = None,
 ) -> LoopTiming:
     """Run a scenario against the wall clock; `run_lockstep` has these arguments too, and makes the same ticks.
+
+    The planner's thread computes in a process of its own, or by itself (`loop.realtime_planner`). By itself it shares
+    the interpreter with the ticks, which then wait for each other.
 
     Tick k belongs at `start + k · timestep`. It is never skipped: on a machine that cannot keep up, simulated time lags
     the wall clock, later ticks follow without a pause until the lag is made up, and every tick that begins more than a
@@ -64,7 +69,6 @@ def run_realtime(
     delay = scenario.loop.planner_delay_ticks
     timing.begin(timestep=step, realtime=True)
     finished = Mailbox()  # the tracker sees a plan only when the tick has taken it over and counted its latency
-    worker = PlannerThread(session.planner, finished)
     due = False
 
     def exchange(state: RobotState) -> None:
@@ -80,7 +84,7 @@ def run_realtime(
         if due:
             worker.request(state)
 
-    with _undisturbed(), worker:
+    with _planner(scenario, session) as planner, PlannerThread(planner, finished) as worker, _undisturbed():
         start = perf_counter()
         for k in range(session.ticks):
             slot = start + k * step
@@ -106,13 +110,19 @@ def run_realtime(
     return timing
 
 
+class AnyPlanner(Protocol):
+    """A planner, wherever it computes."""
+
+    def solve(self, state: RobotState) -> Plan: ...
+
+
 class PlannerThread:
     """Solves on the newest snapshot it was given and posts the plan; a context manager: start on entry, join on exit.
 
     `request` and `check` belong to the tick thread and never wait for the planner.
     """
 
-    def __init__(self, planner: Planner, mailbox: Mailbox) -> None:
+    def __init__(self, planner: AnyPlanner, mailbox: Mailbox) -> None:
         """`planner` is used by this thread alone from entry to exit; `mailbox` receives its plans."""
         self._planner, self._mailbox = planner, mailbox
         self._requests: SimpleQueue[RobotState | None] = SimpleQueue()  # None: stop
@@ -171,6 +181,16 @@ def _wait_until(deadline: float) -> float:
     while (now := perf_counter()) < deadline:
         sleep(0)  # gives the interpreter to the planner, which a bare spin would keep from it
     return now - deadline
+
+
+@contextmanager
+def _planner(scenario: Scenario, session: Session) -> Iterator[AnyPlanner]:
+    """Who computes for the planner's thread."""
+    if scenario.loop.realtime_planner == "thread":
+        yield session.planner
+        return
+    with PlannerProcess(scenario) as planner:
+        yield planner
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -29,6 +29,10 @@ class LoopSettings(StrictModel):
         default=0.01,
         le=1,
         description="Simulated time from a plan's snapshot until it takes effect; a multiple of the physics step [s].",
+    )
+    realtime_planner: Literal["process", "thread"] = Field(
+        default="process",
+        description="Where the planner's thread computes in a real-time run: in a process of its own, or in itself.",
     )
 
     @property
