@@ -1,6 +1,8 @@
-"""Velocities and Jacobians of frames from Pinocchio's joint screws, as machine code."""
+"""Velocities and Jacobians of frames from Pinocchio's joint screws, and how far they are turned, as machine code."""
 
 from __future__ import annotations
+
+from math import atan2, cos, pi, sin, sqrt
 
 import numpy as np
 import pinocchio as pin
@@ -73,3 +75,34 @@ def frame_terms(J, v, chains, lengths, positions, jacobian, twist, drift):  # ty
         drift[f, 1] = ay + bz * px - bx * pz + wz * tx - wx * tz
         drift[f, 2] = az + bx * py - by * px + wx * ty - wy * tx
         drift[f, 3], drift[f, 4], drift[f, 5] = bx, by, bz
+
+
+@short_kernel
+def turn_to_level(yaw, R, out):  # type: ignore[no-untyped-def]
+    """Write the rotation vector (3,) in world that turns `R` (3, 3) into `level_frame(yaw)`; see `rotation_error`."""
+    c, s = cos(yaw), sin(yaw)
+    E = np.empty((3, 3))
+    for j in range(3):
+        E[0, j] = c * R[j, 0] - s * R[j, 1]
+        E[1, j] = s * R[j, 0] + c * R[j, 1]
+        E[2, j] = R[j, 2]
+    out[0], out[1], out[2] = E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]
+    sine = 0.5 * sqrt(out[0] ** 2 + out[1] ** 2 + out[2] ** 2)
+    cosine = 0.5 * (E[0, 0] + E[1, 1] + E[2, 2] - 1.0)
+    if sine >= 1e-9:
+        scale = 0.5 * atan2(sine, cosine) / sine
+        for i in range(3):
+            out[i] *= scale
+    elif cosine > 0.0:
+        for i in range(3):
+            out[i] *= 0.5
+    else:  # E + 1 = 2 a aᵀ for a half turn about a
+        for i in range(3):
+            E[i, i] += 1.0
+        longest = 0
+        for i in range(1, 3):
+            if E[i, i] > E[longest, longest]:
+                longest = i
+        length = sqrt(E[0, longest] ** 2 + E[1, longest] ** 2 + E[2, longest] ** 2)
+        for i in range(3):
+            out[i] = pi * E[i, longest] / length

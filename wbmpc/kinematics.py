@@ -40,6 +40,20 @@ class Kinematics:
         pin.updateFramePlacements(self._model, self._data)
         self._has_velocity = False
 
+    def views(
+        self, positions: tuple[int, ...], rotations: tuple[int, ...]
+    ) -> tuple[Vector, Vector, Vector, tuple[Vector, ...], tuple[Vector, ...]]:
+        """Where Pinocchio keeps them, for kernels: read after any update, and never written.
+
+        Joint screws about the world's origin (6, nv), the CoM's Jacobian (3, nv) and place (3,), and the `positions`
+        (3,) and `rotations` (3, 3) of frames. A `pin.Data` never moves its memory.
+        """
+        data = self._data
+        return (
+            *(data.J, data.Jcom, data.com[0]),
+            *(tuple(data.oMf[f].translation for f in positions), tuple(data.oMf[f].rotation for f in rotations)),
+        )
+
     def position(self, frame: int) -> Vector:
         """Origin (3,) of the frame in world [m]."""
         return np.array(self._data.oMf[frame].translation)

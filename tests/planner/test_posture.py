@@ -7,9 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from plain_posture import plain_step
 from robots import at, palms, soles, surena
 
-from wbmpc.planner.posture import ELBOW_CLEARANCE, JOINT_MARGIN, PalmTarget, Posture
+from wbmpc.planner.posture import JOINT_MARGIN, PalmTarget, Posture
+from wbmpc.planner.posture_kernel import ELBOW_CLEARANCE
 from wbmpc.rotations import level_frame
 from wbmpc.signals import Vector
 
@@ -140,3 +142,32 @@ def test_the_same_task_elsewhere_in_the_world_gets_the_same_posture(x: float, y:
     assert_allclose(there.q[7:], here.q[7:], atol=1e-4)
     assert_allclose(there.com, turn @ here.com + shift, atol=1e-4)
     assert there.residual == pytest.approx(here.residual, abs=1e-5)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_a_step_is_that_of_the_plain_form(seed: int) -> None:
+    """Palms without a target, in the air or on a surface; far targets push joints to their ends."""
+    rng = np.random.default_rng(seed)
+    posture = Posture(ROBOT, nominal=HOME, com_cost=COM_COST, tilt_cost=rng.choice([0.0, 0.03]))
+    normals = [None, np.array([0.0, 0.0, 1.0])]
+    places = palms(HOME) + rng.uniform(-0.4, 0.4, (2, 3))
+    wanted = [rng.choice([None, PalmTarget(place, normals[rng.integers(2)])]) for place in places]
+    yaws, feet = rng.uniform(-0.3, 0.3, 2), SOLES + rng.uniform(-0.03, 0.03, (2, 3)) * [1.0, 1.0, 0.0]
+    centre = feet[:, :2].mean(axis=0)
+    told = {"soles": feet, "yaws": yaws, "palms": wanted}
+    posture.iterate(1, centre=centre, **told)
+    for _ in range(6):
+        before = posture.q
+        posture.iterate(1, centre=centre, **told)
+        step = plain_step(
+            before,
+            nominal=HOME,
+            com=np.array([*centre, at(HOME).com[2]]),
+            com_cost=COM_COST,
+            tilt_cost=posture.tilt_cost,
+            **told,
+        )
+        expected = ROBOT.integrate(before, step)
+        expected[7:] = np.clip(expected[7:], LOWER, UPPER)
+        assert_allclose(posture.q, expected, atol=1e-8)

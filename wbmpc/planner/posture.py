@@ -7,16 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from wbmpc.frame_terms import chains_of
 from wbmpc.kinematics import Kinematics
+from wbmpc.planner.posture_kernel import Targets, posture_step
 from wbmpc.planner.support import UNEVEN
 from wbmpc.robot import Robot
-from wbmpc.rotations import UP, cross, heading_of, level_frame, rotation_error
+from wbmpc.rotations import heading_of, level_frame
 from wbmpc.signals import Vector
 
-SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 2e-3
-ELBOW_CLEARANCE = 0.03  # [m] of an elbow over the tangent plane through its palm: the forearm is as thick as the palm
-DAMPING = 1e-2
-STEP_LIMIT = 0.3  # [rad, m] largest change of one coordinate per iteration
 PATIENCE = 60  # iterations for the same targets; what has not converged by then is out of reach
 CONVERGED = 1e-5  # [rad, m] step below which the same targets need no further iteration
 SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets are in reach
@@ -45,8 +43,8 @@ class Posture:
 
         `com_cost`: w [cost / m²]; `tilt_cost`: w_t [cost / rad²].
         """
-        self._robot, self._nominal, self._com_cost = robot, nominal, com_cost
-        self._tilt_cost = tilt_cost
+        self._robot, self._nominal, self._com_cost = robot, nominal.copy(), com_cost
+        self.tilt_cost = tilt_cost  # [cost / rad²]
         self._kinematics = Kinematics(robot)
         self._kinematics.update_kinematics(nominal)
         self._height = float(self._kinematics.com[2])
@@ -62,6 +60,13 @@ class Posture:
         self._targets: tuple[bytes, ...] = ()
         self._step = np.inf  # [rad, m] largest change of the last iteration
         self._left = PATIENCE
+        frames = (*robot.sole_frames, *robot.palm_frames, *robot.elbow_frames, robot.torso_frame)
+        self._views = self._kinematics.views(frames[:6], (*robot.sole_frames, robot.torso_frame))
+        self._chains = chains_of(robot.pin_model, frames)
+        self._told = Targets(
+            *(np.zeros((2, 3)), np.zeros(2), np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2, np.int64), np.zeros(3))
+        )
+        self._delta, self._found = np.zeros(robot.nv), np.zeros(5)
 
     @property
     def settled(self) -> bool:
@@ -94,7 +99,7 @@ class Posture:
             palms: wanted places of the palms, left and right; None for a free hand.
             centre: (2,) where the CoM should rather be [m].
         """
-        robot, kinematics, nv = self._robot, self._kinematics, self._robot.nv
+        robot, told = self._robot, self._told
         reached = tuple(p is not None for p in palms)
         if reached != self._reached:  # other hands: from the start, a neighbouring optimum can be a contorted one
             self.q, self._reached = self._start(soles, yaws), reached
@@ -106,54 +111,30 @@ class Posture:
         )
         if targets != self._targets:
             self._targets, self._step, self._left = targets, np.inf, PATIENCE
+        if self._step < CONVERGED or self._left == 0:
+            return
+        told.soles[:], told.yaws[:], told.com[:2] = soles, yaws, centre
+        told.com[2] = self._height + _level(soles)
+        for side, palm in enumerate(palms):
+            told.given[side] = 0 if palm is None else 1 if palm.normal is None else 2
+            if palm is not None:
+                told.palms[side] = palm.position
+                told.normals[side] = 0.0 if palm.normal is None else palm.normal
         for _ in range(count):
             if self._step < CONVERGED or self._left == 0:
-                return
+                break
             self._left -= 1
-            kinematics.update_kinematics(self.q)
-            H = np.zeros((nv, nv))
-            g = np.zeros(nv)
-            self.residual = 0.0
-            for side, frame in enumerate(robot.sole_frames):
-                level = level_frame(yaws[side])
-                J = kinematics.jacobian(frame)
-                error = np.concatenate(
-                    [
-                        soles[side] - kinematics.position(frame),
-                        rotation_error(desired=level, measured=kinematics.rotation(frame)),
-                    ]
-                )
-                self.residual = max(self.residual, float(np.linalg.norm(error[:3])))
-                H += SOLE_COST * (J.T @ J)
-                g += SOLE_COST * (J.T @ error)
-            self._add_palms(palms, H, g)
-            self.com = kinematics.com
-            J = kinematics.com_jacobian[:2]
-            H += self._com_cost * (J.T @ J)
-            g += self._com_cost * (J.T @ (centre - self.com[:2]))
-            J = kinematics.com_jacobian[2]
-            H += HEIGHT_COST * np.outer(J, J)
-            g += HEIGHT_COST * (self._height + _level(soles) - self.com[2]) * J
-            if self._tilt_cost:
-                self._add_tilt(H, g)
-            diagonal = H.reshape(-1)[:: nv + 1]
-            diagonal[6:] += POSTURE_COST
-            g[6:] += POSTURE_COST * (self._nominal[7:] - self.q[7:])
-            diagonal += DAMPING
-            delta = np.asarray(np.linalg.solve(H, g), dtype=np.float64)
-            # joints that would leave their range are fixed at it, once, and the rest solved again
-            wanted = self.q[7:] + delta[6:]
-            outside = np.flatnonzero((wanted < self._lower) | (wanted > self._upper)) + 6
-            if outside.size:
-                fixed = np.clip(wanted, self._lower, self._upper)[outside - 6] - self.q[7:][outside - 6]
-                free = np.setdiff1d(np.arange(nv), outside)
-                rest = g[free] - H[np.ix_(free, outside)] @ fixed
-                delta[outside] = fixed
-                delta[free] = np.linalg.solve(H[np.ix_(free, free)], rest)
-            np.clip(delta, -STEP_LIMIT, STEP_LIMIT, out=delta)
-            self.q = robot.integrate(self.q, delta)
+            self._kinematics.update_kinematics(self.q)
+            posture_step(
+                *(self._views, *self._chains, told, self._com_cost, self.tilt_cost),
+                *(self.q, self._nominal, self._lower, self._upper, self._delta, self._found),
+            )
+            self.q = robot.integrate(self.q, self._delta)
             np.clip(self.q[7:], self._lower, self._upper, out=self.q[7:])
-            self._step = float(np.abs(delta).max())
+            self._step = self._found[4]
+        self.com = self._kinematics.com
+        self.palm_errors = self._found[:2].copy()
+        self.residual, self.elbow_excess = float(self._found[2]), float(self._found[3])
 
     def _start(self, soles: Vector, yaws: Vector) -> Vector:
         """The nominal posture (nq,) over the feet: from afar the way there ends in a contorted optimum."""
@@ -162,41 +143,6 @@ class Posture:
         q[2] += _level(soles)
         q[3:7] = (pin.Quaternion(turn) * pin.Quaternion(q[3:7])).coeffs()
         return q
-
-    def _add_tilt(self, H: Vector, g: Vector) -> None:
-        """Add  w_t |angle of the torso's axis to the vertical|²  to the normal equations."""
-        frame = self._robot.torso_frame
-        J = self._kinematics.jacobian(frame)[3:5]
-        error = cross(self._kinematics.rotation(frame)[:, 2], UP)[:2]
-        H += self._tilt_cost * (J.T @ J)
-        g += self._tilt_cost * (J.T @ error)
-
-    def _add_palms(self, palms: list[PalmTarget | None], H: Vector, g: Vector) -> None:
-        """Add the palms' and elbows' terms to the normal equations  H (nv, nv), g (nv,)."""
-        robot, kinematics = self._robot, self._kinematics
-        self.elbow_excess = 0.0
-        self.palm_errors[:] = 0.0
-        for side, frame in enumerate(robot.palm_frames):
-            target = palms[side]
-            if target is None:
-                continue
-            J = kinematics.jacobian(frame)[:3]
-            error = target.position - kinematics.position(frame)
-            self.palm_errors[side] = np.linalg.norm(error)
-            self.residual = max(self.residual, float(self.palm_errors[side]))
-            error *= min(1.0, 0.1 / max(float(np.linalg.norm(error)), 1e-9))
-            H += PALM_COST * (J.T @ J)
-            g += PALM_COST * (J.T @ error)
-            if target.normal is None:
-                continue
-            elbow = robot.elbow_frames[side]
-            height = target.normal @ (kinematics.position(elbow) - kinematics.position(frame))
-            excess = ELBOW_CLEARANCE - float(height)
-            if excess > 0.0:
-                self.elbow_excess = max(self.elbow_excess, excess)
-                row = target.normal @ (kinematics.jacobian(elbow)[:3] - J)
-                H += ELBOW_COST * np.outer(row, row)
-                g += ELBOW_COST * excess * row
 
 
 def _level(soles: Vector) -> float:
