@@ -78,6 +78,22 @@ def frame_terms(J, v, chains, lengths, positions, jacobian, twist, drift):  # ty
 
 
 @short_kernel
+def frame_rows(J, chain, length, at, out):  # type: ignore[no-untyped-def]
+    """Write a frame's Jacobian into `out`, which is zero: (3, nv) of its origin `at` (3,), or (6, nv) with turning.
+
+    `chain` (length,) lists the coordinates that move the frame; `J` as in `frame_terms`.
+    """
+    for c in range(length):
+        k = chain[c]
+        rx, ry, rz = J[3, k], J[4, k], J[5, k]
+        out[0, k] = J[0, k] + ry * at[2] - rz * at[1]
+        out[1, k] = J[1, k] + rz * at[0] - rx * at[2]
+        out[2, k] = J[2, k] + rx * at[1] - ry * at[0]
+        if len(out) == 6:
+            out[3, k], out[4, k], out[5, k] = rx, ry, rz
+
+
+@short_kernel
 def turn_to_level(yaw, R, out):  # type: ignore[no-untyped-def]
     """Write the rotation vector (3,) in world that turns `R` (3, 3) into `level_frame(yaw)`; see `rotation_error`."""
     c, s = cos(yaw), sin(yaw)

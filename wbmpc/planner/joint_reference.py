@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
+from wbmpc.frame_terms import chains_of
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.footstep import SoleReferences
+from wbmpc.planner.joint_reference_kernel import Pulls, Wanted, linearise
 from wbmpc.planner.joint_velocities import VelocityTasks
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.robot import Robot
-from wbmpc.rotations import angle_difference, cross, heading_of, level_frame, rotation_error
 from wbmpc.signals import SIDES, HandMode, Vector
 
-LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
 SPEED_SHARE = 0.6  # of the servo's no-load speed that a plan may use
 
 
@@ -26,8 +28,14 @@ class JointReference:
     def __init__(self, robot: Robot, settings: WholeBodySettings, *, q: Vector) -> None:
         self._robot, self._settings = robot, settings
         self._kinematics = Kinematics(robot)
-        self._upper_body = np.setdiff1d(np.arange(robot.nj), np.concatenate(robot.leg_joints))
-        self._trunk = np.setdiff1d(self._upper_body, np.concatenate(robot.arm_joints))
+        frames = (*robot.sole_frames, *robot.palm_frames, robot.torso_frame)
+        self._views = self._kinematics.views(frames[:4], (*robot.sole_frames, robot.torso_frame))
+        self._chains = chains_of(robot.pin_model, frames)
+        self._pulls = Pulls(settings.tracking_rate, settings.torso_rate, settings.posture_rate)
+        self._limits = np.array([robot.joint_lower, robot.joint_upper, SPEED_SHARE * robot.joint_speed])
+        self._weights = {active: self._weight(active) for active in product((False, True), repeat=2)}
+        self._palms, self._palm_velocities = np.zeros((2, 3)), np.zeros((2, 3))  # of the references
+        self._palm_jacobian, self._torso_jacobian = np.zeros((6, robot.nv)), np.zeros((3, robot.nv))
         self.q = q.copy()  # (nq,)
         self._kinematics.update_kinematics(self.q)
 
@@ -37,20 +45,16 @@ class JointReference:
         return self._kinematics.rotation(self._robot.torso_frame)
 
     def torso_velocity(self, velocity: Vector) -> Vector:
-        """Angular velocity (3,) of the torso in world for joint velocities (nv,) [rad/s]."""
-        return self._kinematics.jacobian(self._robot.torso_frame)[3:] @ velocity
+        """Angular velocity (3,) of the torso in world for joint velocities (nv,) [rad/s], where `tasks` looked last."""
+        return np.asarray(self._torso_jacobian @ velocity)
 
     def palms(self, velocity: Vector) -> tuple[Vector, Vector]:
-        """Palm positions (2, 3) [m] at the reference and their velocities (2, 3) [m/s] for joint velocities (nv,).
+        """Palm positions (2, 3) [m] and their velocities (2, 3) [m/s] for q̇ (nv,), where `tasks` looked last.
 
         The tracker follows these and not the task's own path: stage 2 has already weighed the palm against the CoM, so
         that a target beyond reach never pulls the robot off its balance.
         """
-        frames = self._robot.palm_frames
-        return (
-            np.array([self._kinematics.position(f) for f in frames]),
-            np.array([self._kinematics.jacobian(f)[:3] @ velocity for f in frames]),
-        )
+        return np.array(self._views[3][2:]), (self._palm_jacobian @ velocity).reshape(2, 3)
 
     def advance(self, velocity: Vector, dt: float) -> None:
         """Integrate q̇ (nv,) over dt [s]."""
@@ -79,59 +83,44 @@ class JointReference:
             torso_up: (3,) where the torso's own vertical should point, in world.
             torso_heading: its yaw [rad].
         """
-        robot, settings, kinematics, nv = self._robot, self._settings, self._kinematics, self._robot.nv
-        kinematics.update_kinematics(self.q)
-        rate = settings.tracking_rate
-        foot_jacobian, foot_velocity = np.empty((12, nv)), np.empty(12)
-        hand_jacobian, hand_velocity = np.empty((6, nv)), np.zeros(6)
-        active = np.zeros(2)
-        for side in range(len(SIDES)):
-            frame = robot.sole_frames[side]
-            level = level_frame(soles.yaws[side])
-            rows = slice(6 * side, 6 * side + 6)
-            foot_jacobian[rows] = kinematics.jacobian(frame)
-            foot_velocity[6 * side : 6 * side + 3] = soles.velocities[side] + rate * (
-                soles.positions[side] - kinematics.position(frame)
-            )
-            foot_velocity[6 * side + 3 : 6 * side + 6] = rate * rotation_error(
-                desired=level, measured=kinematics.rotation(frame)
-            )
-            foot_velocity[6 * side + 5] += soles.yaw_rates[side]
-            frame = robot.palm_frames[side]
-            hand_jacobian[3 * side : 3 * side + 3] = kinematics.jacobian(frame)[:3]
-            position, velocity, mode = hands[side]
-            if mode != HandMode.FREE:
-                active[side] = 1.0
-                pull = rate * (position - kinematics.position(frame))
-                norm = float(np.linalg.norm(pull))
-                hand_velocity[3 * side : 3 * side + 3] = velocity + pull * min(1.0, 0.4 / max(norm, 1e-9))
-        torso = kinematics.rotation(robot.torso_frame)
-        torso_error = cross(torso[:, 2], torso_up)
-        torso_error[2] += angle_difference(torso_heading, heading_of(torso))
-        weight = np.ones(nv)  # the legs carry the CoM about: arms and waist have better things to do
-        weight[6 + self._upper_body] = settings.upper_body_share
-        for side in range(len(SIDES)):
-            if active[side]:
-                weight[6 + robot.arm_joints[side]] = weight[6 + self._trunk] = 1.0
-        posture_velocity = np.zeros(nv)
-        posture_velocity[6:] = settings.posture_rate * (posture - self.q[7:])
-        speed = SPEED_SHARE * robot.joint_speed
-        lower, upper = np.full(nv, -5.0), np.full(nv, 5.0)
-        lower[6:] = np.clip((robot.joint_lower - self.q[7:]) / LIMIT_TIME, -speed, 0.0)
-        upper[6:] = np.clip((robot.joint_upper - self.q[7:]) / LIMIT_TIME, 0.0, speed)
+        palms, velocities, active = self._palms, self._palm_velocities, np.zeros(2)
+        for side, (position, velocity, mode) in enumerate(hands):
+            palms[side], velocities[side] = position, velocity
+            active[side] = 0.0 if mode == HandMode.FREE else 1.0
+        self._kinematics.update_kinematics(self.q)
+        wanted = Wanted(
+            *(com, soles.positions, soles.velocities, soles.yaws, soles.yaw_rates),
+            *(palms, velocities, active, posture, torso_up, torso_heading),
+        )
+        com_jacobian, com_correction, feet, foot_velocity, self._palm_jacobian, hand_velocity, *rest = linearise(
+            self._views, *self._chains, self._pulls, self.q, self._limits, wanted
+        )
+        self._torso_jacobian, torso_velocity, posture_velocity, lower, upper = rest
         return VelocityTasks(
-            com_jacobian=kinematics.com_jacobian,
-            com_correction=rate * (com - kinematics.com),
+            com_jacobian=com_jacobian,
+            com_correction=com_correction,
             com_vertical_velocity=vertical_velocity,
-            foot_jacobian=foot_jacobian,
+            foot_jacobian=feet,
             foot_velocity=foot_velocity,
-            hand_jacobian=hand_jacobian,
+            hand_jacobian=self._palm_jacobian,
             hand_velocity=hand_velocity,
             hand_active=active,
-            torso_jacobian=kinematics.jacobian(robot.torso_frame)[3:],
-            torso_velocity=settings.torso_rate * torso_error,
+            torso_jacobian=self._torso_jacobian,
+            torso_velocity=torso_velocity,
             posture_velocity=posture_velocity,
-            posture_weight=weight,
+            posture_weight=self._weights[bool(active[0]), bool(active[1])],
             lower=lower,
             upper=upper,
         )
+
+    def _weight(self, active: tuple[bool, bool]) -> Vector:
+        """(nv,) of the posture: the legs carry the CoM about, arms and waist have better things to do."""
+        robot = self._robot
+        upper_body = np.setdiff1d(np.arange(robot.nj), np.concatenate(robot.leg_joints))
+        weight = np.ones(robot.nv)
+        weight[6 + upper_body] = self._settings.upper_body_share
+        for side in range(len(SIDES)):
+            if active[side]:
+                weight[6 + robot.arm_joints[side]] = 1.0
+                weight[6 + np.setdiff1d(upper_body, np.concatenate(robot.arm_joints))] = 1.0
+        return weight

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.frame_terms import turn_to_level
+from wbmpc.frame_terms import frame_rows, turn_to_level
 from wbmpc.jit import kernel
 from wbmpc.planner.cholesky import factor, substitute
 from wbmpc.signals import Vector
@@ -64,7 +64,7 @@ def posture_step(
     found[:] = 0.0
     for side in range(2):
         first = SOLE_ROW + 6 * side
-        _frame_rows(J, chains[side], lengths[side], positions[side], rows[first : first + 6])
+        frame_rows(J, chains[side], lengths[side], positions[side], rows[first : first + 6])
         turn_to_level(targets.yaws[side], rotations[side], turn)
         square = 0.0
         for i in range(3):
@@ -77,7 +77,7 @@ def posture_step(
         if targets.given[side] == 0:
             continue
         first, palm = PALM_ROW + 3 * side, positions[2 + side]
-        _frame_rows(J, chains[2 + side], lengths[2 + side], palm, rows[first : first + 3])
+        frame_rows(J, chains[2 + side], lengths[2 + side], palm, rows[first : first + 3])
         square = 0.0
         for i in range(3):
             wanted[first + i] = targets.palms[side, i] - palm[i]
@@ -95,7 +95,7 @@ def posture_step(
         if excess > 0.0:
             found[3] = max(found[3], excess)
             moved, row = np.zeros((3, nv)), ELBOW_ROW + side
-            _frame_rows(J, chains[4 + side], lengths[4 + side], elbow, moved)
+            frame_rows(J, chains[4 + side], lengths[4 + side], elbow, moved)
             for i in range(3):
                 for k in range(nv):
                     rows[row, k] += targets.normals[side, i] * (moved[i, k] - rows[first + i, k])
@@ -132,19 +132,6 @@ def posture_step(
     for i in range(nv):
         delta[i] = min(max(delta[i], -STEP_LIMIT), STEP_LIMIT)
         found[4] = max(found[4], abs(delta[i]))
-
-
-@kernel
-def _frame_rows(J: Vector, chain: NDArray[np.int64], length: int, at: Vector, out: Vector) -> None:
-    """Write the first rows of a frame's Jacobian, linear then angular, into `out` (3 or 6, nv), which is zero."""
-    for c in range(length):
-        k = chain[c]
-        rx, ry, rz = J[3, k], J[4, k], J[5, k]
-        out[0, k] = J[0, k] + ry * at[2] - rz * at[1]
-        out[1, k] = J[1, k] + rz * at[0] - rx * at[2]
-        out[2, k] = J[2, k] + rx * at[1] - ry * at[0]
-        if len(out) == 6:
-            out[3, k], out[4, k], out[5, k] = rx, ry, rz
 
 
 @kernel

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbmpc.frame_terms import chains_of, frame_twists
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.footstep import Feet
 from wbmpc.robot import Robot
 from wbmpc.rotations import heading_of
 from wbmpc.signals import RobotState, Vector
+
+LEG_LINKS = [[7, 8], [8, 9], [10, 11], [11, 12]]  # among the frames that are read: hip to knee, knee to ankle
 
 
 class Snapshot:
@@ -16,20 +19,24 @@ class Snapshot:
 
     def __init__(self, robot: Robot, q: Vector) -> None:
         """At rest at `q` (nq,)."""
-        self._robot, self._kinematics = robot, Kinematics(robot)
-        self._kinematics.update(q, np.zeros(robot.nv))
-        self._read()
+        self._kinematics = Kinematics(robot)
+        frames = (*robot.palm_frames, *robot.elbow_frames, *robot.sole_frames, robot.torso_frame)
+        legs = [frame for leg in robot.leg_frames for frame in leg]
+        self._views = self._kinematics.views((*frames, *legs), (*robot.sole_frames, robot.torso_frame))
+        self._palm_chains = chains_of(robot.pin_model, robot.palm_frames)
+        self._kinematics.update_kinematics(q)
+        self._read(np.zeros(robot.nv))
         self.feet_zmp = self.com[:2].copy()  # (2,) [m] centre of both soles' pressure
         self._homes = (self.palms - self._torso_position) @ self._torso_rotation  # in the torso
 
     def update(self, state: RobotState) -> None:
         """Take in a new state."""
-        self._kinematics.update(state.q, state.v)
-        self._read()
-        force, moment = state.sole_wrench_in_world[:, :3], state.sole_wrench_in_world[:, 3:]
-        load = max(float(force[:, 2].sum()), 1e-6)
-        levers = np.column_stack([-moment[:, 1], moment[:, 0]])
-        self.feet_zmp = (force[:, 2] @ self.soles[:, :2] + levers.sum(axis=0)) / load
+        self._kinematics.update_kinematics(state.q)
+        self._read(state.v)
+        (_, _, left, left_x, left_y, _), (_, _, right, right_x, right_y, _) = state.sole_wrench_in_world.tolist()
+        load = max(left + right, 1e-6)
+        levers = np.array([-left_y - right_y, left_x + right_x])
+        self.feet_zmp = (left * self.soles[0, :2] + right * self.soles[1, :2] + levers) / load
 
     @property
     def palm_homes(self) -> Vector:
@@ -46,15 +53,14 @@ class Snapshot:
         """Palms (2, 3), elbows (2, 3) and the ends of thighs and shanks (4, 2, 3) [m]."""
         return self.palms, self.elbows, self.leg_links
 
-    def _read(self) -> None:
-        kinematics, robot = self._kinematics, self._robot
-        self.com, self.com_velocity = kinematics.com, kinematics.com_velocity  # (3,) [m], [m/s]
-        self.palms = np.array([kinematics.position(f) for f in robot.palm_frames])  # (2, 3) [m]
-        self.elbows = np.array([kinematics.position(f) for f in robot.elbow_frames])  # (2, 3) [m]
-        joints = np.array([[kinematics.position(f) for f in leg] for leg in robot.leg_frames])  # (2, 3, 3)
-        self.leg_links = np.stack([joints[:, :-1], joints[:, 1:]], axis=2).reshape(4, 2, 3)  # [m] thighs, shanks
-        self.palm_velocities = np.array([kinematics.velocity(f)[:3] for f in robot.palm_frames])  # (2, 3) [m/s]
-        self.soles = np.array([kinematics.position(f) for f in robot.sole_frames])  # (2, 3) [m]
-        self.sole_yaws = np.array([heading_of(kinematics.rotation(f)) for f in robot.sole_frames])  # (2,) [rad]
-        self._torso_position = kinematics.position(robot.torso_frame)
-        self._torso_rotation = kinematics.rotation(robot.torso_frame)
+    def _read(self, v: Vector) -> None:
+        """Copy what Pinocchio has computed, with joint velocities `v` (nv,)."""
+        J, com_jacobian, com, places, rotations = self._views
+        frames, twists = np.array(places), np.empty((2, 6))
+        frame_twists(J, v, *self._palm_chains, places[:2], twists)
+        self.com, self.com_velocity = com.copy(), com_jacobian @ v  # (3,) [m], [m/s]
+        self.palms, self.elbows, self.soles = frames[:2], frames[2:4], frames[4:6]  # (2, 3) [m]
+        self.leg_links = frames[LEG_LINKS]  # (4, 2, 3) [m] thighs, shanks
+        self.palm_velocities = twists[:, :3]  # (2, 3) [m/s]
+        self.sole_yaws = np.array([heading_of(rotations[0]), heading_of(rotations[1])])  # (2,) [rad]
+        self._torso_position, self._torso_rotation = frames[6], rotations[2].copy()

@@ -1,0 +1,111 @@
+"""Stage 2's velocity tasks linearised at a configuration, in one compiled call."""
+
+from __future__ import annotations
+
+from math import atan2, pi, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbmpc.frame_terms import frame_rows, turn_to_level
+from wbmpc.jit import kernel
+from wbmpc.signals import Vector
+
+LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
+BASE_SPEED = 5.0  # [m/s, rad/s] bound on the base's velocity
+FASTEST_PULL = 0.4  # [m/s] of a palm that is off its reference
+
+
+class Pulls(NamedTuple):
+    """How fast errors are taken out, all [1/s]."""
+
+    tracking: float
+    torso: float
+    posture: float
+
+
+class Wanted(NamedTuple):
+    """What the tasks are at this plan."""
+
+    com: Vector  # (3,) [m]
+    soles: Vector  # (2, 3) [m]
+    sole_velocities: Vector  # (2, 3) [m/s]
+    sole_yaws: Vector  # (2,) [rad]
+    sole_yaw_rates: Vector  # (2,) [rad/s]
+    palms: Vector  # (2, 3) [m]
+    palm_velocities: Vector  # (2, 3) [m/s]
+    active: Vector  # (2,) 1 for a palm with a reference
+    posture: Vector  # (nj,) [rad]
+    torso_up: Vector  # (3,)
+    torso_heading: float  # [rad]
+
+
+@kernel
+def linearise(
+    pin: Any,
+    chains: NDArray[np.int64],
+    lengths: NDArray[np.int64],
+    pulls: Pulls,
+    q: Vector,
+    limits: Vector,
+    wanted: Wanted,
+) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]:
+    """Fields of `VelocityTasks`: Jacobian and velocity of CoM (3), feet (12), hands (6) and torso (3); then posture's
+    velocity (nv,) and the bounds (nv,) on q̇.
+
+    Args:
+        pin: Pinocchio's views at q: J (6, nv), J_com (3, nv), CoM, positions of soles and palms, rotations (3, 3) of
+            both soles and torso.
+        chains, lengths: of soles, palms and torso, see `chains_of`.
+        limits: (3, nj) lowest and highest angle [rad], largest speed [rad/s].
+    """
+    J, com_jacobian, com, positions, rotations = pin
+    nj = len(wanted.posture)
+    nv = nj + 6
+    com_J, com_velocity = com_jacobian.copy(), np.empty(3)
+    foot_J, foot_velocity = np.zeros((12, nv)), np.empty(12)
+    hand_J, hand_velocity = np.zeros((6, nv)), np.zeros(6)
+    torso_J, torso_velocity = np.zeros((3, nv)), np.empty(3)
+    posture_velocity, lower, upper = np.zeros(nv), np.empty(nv), np.empty(nv)
+    turn = np.empty(3)
+    for i in range(3):
+        com_velocity[i] = pulls.tracking * (wanted.com[i] - com[i])
+    for side in range(2):
+        first = 6 * side
+        frame_rows(J, chains[side], lengths[side], positions[side], foot_J[first : first + 6])
+        turn_to_level(wanted.sole_yaws[side], rotations[side], turn)
+        for i in range(3):
+            error = wanted.soles[side, i] - positions[side][i]
+            foot_velocity[first + i] = wanted.sole_velocities[side, i] + pulls.tracking * error
+            foot_velocity[first + 3 + i] = pulls.tracking * turn[i]
+        foot_velocity[first + 5] += wanted.sole_yaw_rates[side]
+        first, palm = 3 * side, positions[2 + side]
+        frame_rows(J, chains[2 + side], lengths[2 + side], palm, hand_J[first : first + 3])
+        if wanted.active[side] > 0.0:
+            square = 0.0
+            for i in range(3):
+                square += (pulls.tracking * (wanted.palms[side, i] - palm[i])) ** 2
+            share = pulls.tracking * min(1.0, FASTEST_PULL / max(sqrt(square), 1e-9))
+            for i in range(3):
+                error = wanted.palms[side, i] - palm[i]
+                hand_velocity[first + i] = wanted.palm_velocities[side, i] + share * error
+    torso, up = rotations[2], wanted.torso_up
+    for c in range(lengths[4]):
+        for i in range(3):
+            torso_J[i, chains[4, c]] = J[3 + i, chains[4, c]]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        torso_velocity[i] = pulls.torso * (torso[j, 2] * up[k] - torso[k, 2] * up[j])
+    turned = wanted.torso_heading - atan2(torso[1, 0], torso[0, 0])
+    torso_velocity[2] += pulls.torso * ((turned + pi) % (2.0 * pi) - pi)
+    lower[:6], upper[:6] = -BASE_SPEED, BASE_SPEED
+    for i in range(nj):
+        angle, speed = q[7 + i], limits[2, i]
+        posture_velocity[6 + i] = pulls.posture * (wanted.posture[i] - angle)
+        lower[6 + i] = min(max((limits[0, i] - angle) / LIMIT_TIME, -speed), 0.0)
+        upper[6 + i] = min(max((limits[1, i] - angle) / LIMIT_TIME, 0.0), speed)
+    return (
+        *(com_J, com_velocity, foot_J, foot_velocity, hand_J, hand_velocity),
+        *(torso_J, torso_velocity, posture_velocity, lower, upper),
+    )
