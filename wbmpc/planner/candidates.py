@@ -77,6 +77,7 @@ class Candidates:
             for patch in patches
             for hand in range(len(SIDES))
         ]
+        self._places = {(id(c.patch), c.hand): c for c in self.all}
         self._turn = -1
         self._stand: tuple[bytes, ...] = ()  # where the feet were at the last refresh
         self._left = np.array([0.0, 1.0])  # unit, to the robot's left
@@ -114,7 +115,7 @@ class Candidates:
 
     def of(self, patch: PatchPose | None, hand: int) -> Candidate:
         """The candidate of a hand on a patch."""
-        return next(c for c in self.all if c.patch is patch and c.hand == hand)
+        return self._places[id(patch), hand]
 
     @property
     def settled(self) -> bool:

@@ -106,8 +106,7 @@ class Contacts:
     @property
     def _used(self) -> list[Candidate]:
         """The candidates that the hands have taken, those being given up left out."""
-        taken = {(id(c.patch), c.side) for c in self.hands if c.goal is not None}
-        return [c for c in self.candidates.all if (id(c.patch), c.hand) in taken]
+        return [self.candidates.of(c.patch, c.side) for c in self.hands if c.has_goal]
 
     # ------------------------------------------------------------------ one plan
 

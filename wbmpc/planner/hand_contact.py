@@ -79,16 +79,22 @@ class HandContact:
         return self.phase in (ContactPhase.CHOSEN, ContactPhase.APPROACHING) and self._pace.hurried
 
     @property
+    def has_goal(self) -> bool:
+        """Whether there is a contact to reach or hold."""
+        return self.patch is not None and self.phase != ContactPhase.RELEASED
+
+    @property
     def goal(self) -> Vector | None:
         """Palm position (3,) of the contact in world [m]; None when there is none to reach or hold."""
-        if self.patch is None or self.phase == ContactPhase.RELEASED:
+        if self.patch is None or not self.has_goal:
             return None
         return self._touched if self.touching else self.patch.position + self._radius * self.patch.normal
 
     @property
     def target(self) -> PalmTarget | None:
         """The same for a posture, with the surface's normal."""
-        return PalmTarget(self.goal, self.patch.normal) if self.goal is not None and self.patch is not None else None
+        goal = self.goal
+        return None if goal is None or self.patch is None else PalmTarget(goal, self.patch.normal)
 
     def reference(self) -> tuple[Vector, Vector, Vector]:
         """Palm position, velocity and acceleration (3,) to follow now; only when busy."""

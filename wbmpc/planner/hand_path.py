@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.signals import Vector
 
 LEAD = (0.0, 0.6)  # part of σ in which the leading component moves
@@ -55,15 +56,25 @@ class HandPath:
 
     def positions(self, sigmas: Vector) -> Vector:
         """Positions (n, 3) [m] at `sigmas` (n,)."""
-        way = self.end - self.start
-        along = float(way @ self.away)
-        outward = along * self.away
-        first, second = (LEAD, LAG) if along >= 0.0 else (LAG, LEAD)
-        p = np.tile(self.start, (len(sigmas), 1))
-        for part, (begin, finish) in ((outward, first), (way - outward, second)):
-            phase = np.minimum(np.maximum((sigmas - begin) / (finish - begin), 0.0), 1.0)
-            p += (phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2))[:, None] * part
-        return p
+        return _positions(self.start, self.end, self.away, sigmas)
+
+
+@kernel
+def _positions(start: Vector, end: Vector, away: Vector, sigmas: Vector) -> Vector:
+    n, along = len(sigmas), 0.0
+    for i in range(3):
+        along += (end[i] - start[i]) * away[i]
+    first, second = (LEAD, LAG) if along >= 0.0 else (LAG, LEAD)
+    out = np.empty((n, 3))
+    for k in range(n):
+        outwards = min(max((sigmas[k] - first[0]) / (first[1] - first[0]), 0.0), 1.0)
+        across = min(max((sigmas[k] - second[0]) / (second[1] - second[0]), 0.0), 1.0)
+        outwards = outwards**3 * (10.0 - 15.0 * outwards + 6.0 * outwards**2)
+        across = across**3 * (10.0 - 15.0 * across + 6.0 * across**2)
+        for i in range(3):
+            part = along * away[i]
+            out[k, i] = start[i] + outwards * part + across * (end[i] - start[i] - part)
+    return out
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,11 @@ class Stepping:
         self._steps = [(i, task) for i, task in enumerate(tasks) if isinstance(task, StepTask)]
         self._done: set[int] = set()
 
+    @property
+    def has_commands(self) -> bool:
+        """Whether any task gives a velocity command, now or at another time."""
+        return len(self._commands) > 0
+
     def landed(self, step: Footstep) -> None:
         """A step has been made."""
         if any(i == step.task for i, _ in self._steps):

@@ -33,6 +33,7 @@ class Tasks:
         self.lift = lifts[0] if lifts else None
         self.heights = [task for task in tasks if isinstance(task, ComHeightTask)]
         self._excursions: list[Reach | Lean] = [*self.reaches, *self.leans]
+        self.current = self._pick()  # the reaches still to be done, or the lean that comes before them
         self.shrink = 0.0  # [m] by which d of a reach's hand is smaller than in its posture
 
     def advance(
@@ -72,6 +73,7 @@ class Tasks:
                 task.advance(time, dt, gate_open=gate_open, com=com)
             if task.progress.phase != before:
                 events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
+                self.current = self._pick()
 
     def takes_along(self, *, stepping: bool) -> bool:
         """Whether something that is carried goes with the CoM: from the first stride on."""
@@ -88,9 +90,7 @@ class Tasks:
         """Whether the feet must stay where they are."""
         return self.lift is not None and self.lift.hold_feet
 
-    @property
-    def current(self) -> list[Reach] | list[Lean]:
-        """The reaches still to be done, or the lean that comes before them."""
+    def _pick(self) -> list[Reach] | list[Lean]:
         reaches = [reach for reach in self.reaches if reach.progress.phase != TaskPhase.DONE]
         leans = [lean for lean in self.leans if lean.progress.phase != TaskPhase.DONE]
         first = min(leans, key=lambda lean: lean.task.start, default=None)
