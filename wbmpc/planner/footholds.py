@@ -7,7 +7,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from wbmpc.planner.support import UNEVEN, convex_hull, foot_corners
+from wbmpc.planner.footprint_kernel import is_inside, swept, things_under
+from wbmpc.planner.support import UNEVEN, foot_corners
 from wbmpc.scenario import Obstacle, Tread
 from wbmpc.signals import Vector
 
@@ -28,7 +29,12 @@ class Footholds:
         """`half_extents` (2,) of a sole [m]."""
         self._obstacles: _Footprints[Obstacle] = _Footprints(obstacles)
         self._ground: _Footprints[Tread] = _Footprints(ground)
-        self._sole = half_extents
+        self._sole = half_extents.copy()  # one that may be written to, as the kernels know it
+        nowhere = np.zeros(2)  # compiled here: the first search is in the middle of a run
+        self.free(nowhere, 0.0)
+        outline = self._swept(nowhere, nowhere, 0.0, 0.0)
+        is_inside(outline, outline)
+        things_under(outline, np.zeros((0, 4, 2)))
 
     def free(self, position: Vector, yaw: float) -> bool:
         """Whether a sole with its centre at `position` (2,) [m] is carried as a whole and clear of every obstacle."""
@@ -63,7 +69,7 @@ class Footholds:
         if not under:
             return 0.0
         highest = max(under, key=lambda tread: tread.top)
-        return highest.top if _inside(sole, highest.corners) else None
+        return highest.top if is_inside(sole, highest.corners) else None
 
     def obstructed(self, start: Vector, end: Vector, yaw: float, *, lowest: float) -> bool:
         """Whether an obstacle is in a sole's straight way from `start` to `end` (2,) [m], or too near to its end.
@@ -93,8 +99,7 @@ class Footholds:
 
     def _swept(self, start: Vector, end: Vector, yaw: float, margin: float) -> Vector:
         """Outline (k, 2) [m] of a sole's way, with a `margin` [m] at its end: where it is, it stands already."""
-        ends = ((start, self._sole), (end, self._sole + margin))
-        return convex_hull(np.vstack([foot_corners(position=p, yaw=yaw, half_extents=half) for p, half in ends]))
+        return swept(start, end, yaw, self._sole, margin)
 
 
 class _Footprints(Generic[Thing]):
@@ -102,35 +107,8 @@ class _Footprints(Generic[Thing]):
 
     def __init__(self, things: Sequence[Thing]) -> None:
         self._things = things
-        corners = np.array([thing.corners for thing in things]).reshape(-1, 4, 2)
-        self._lower, self._upper = corners.min(axis=1), corners.max(axis=1)  # (n, 2) [m]
+        self._corners = np.array([thing.corners for thing in things]).reshape(-1, 4, 2)  # [m]
 
     def under(self, polygon: Vector) -> list[Thing]:
         """Those whose footprints overlap a convex `polygon` (k, 2) [m], counter-clockwise."""
-        if not self._things:
-            return []
-        apart = (self._lower >= polygon.max(axis=0)) | (self._upper <= polygon.min(axis=0))
-        near = np.flatnonzero(~apart.any(axis=1)).tolist()  # most are far away; the exact test takes its time
-        return [self._things[i] for i in near if _overlap(polygon, self._things[i].corners)]
-
-
-def _normals(polygon: Vector) -> Vector:
-    """Outward normals (k, 2) of a convex polygon's edges, counter-clockwise, as long as the edges."""
-    edges = np.concatenate([polygon[1:], polygon[:1]]) - polygon
-    return np.column_stack([edges[:, 1], -edges[:, 0]])
-
-
-def _inside(inner: Vector, outer: Vector) -> bool:
-    """Whether all points (n, 2) are in a convex polygon (k, 2), counter-clockwise."""
-    normals = _normals(outer)
-    return bool((inner @ normals.T <= np.einsum("ki,ki->k", normals, outer) + 1e-9).all())
-
-
-def _overlap(a: Vector, b: Vector) -> bool:
-    """Whether two convex polygons (n, 2), counter-clockwise, overlap (separating axes)."""
-    for polygon in (a, b):
-        normals = _normals(polygon).T
-        along_a, along_b = a @ normals, b @ normals
-        if ((along_a.max(axis=0) <= along_b.min(axis=0)) | (along_b.max(axis=0) <= along_a.min(axis=0))).any():
-            return False
-    return True
+        return [self._things[i] for i in things_under(polygon, self._corners)] if self._things else []

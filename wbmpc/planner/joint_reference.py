@@ -89,7 +89,7 @@ class JointReference:
             active[side] = 0.0 if mode == HandMode.FREE else 1.0
         self._kinematics.update_kinematics(self.q)
         wanted = Wanted(
-            *(com, soles.positions, soles.velocities, soles.yaws, soles.yaw_rates),
+            *(np.ascontiguousarray(com), soles.positions, soles.velocities, soles.yaws, soles.yaw_rates),
             *(palms, velocities, active, posture, torso_up, torso_heading),
         )
         com_jacobian, com_correction, feet, foot_velocity, self._palm_jacobian, hand_velocity, *rest = linearise(

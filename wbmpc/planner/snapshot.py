@@ -32,7 +32,7 @@ class Snapshot:
     def update(self, state: RobotState) -> None:
         """Take in a new state."""
         self._kinematics.update_kinematics(state.q)
-        self._read(state.v)
+        self._read(np.array(state.v))
         (_, _, left, left_x, left_y, _), (_, _, right, right_x, right_y, _) = state.sole_wrench_in_world.tolist()
         load = max(left + right, 1e-6)
         levers = np.array([-left_y - right_y, left_x + right_x])

@@ -93,7 +93,7 @@ def horizon_polygons(
             planes[k] = 0.5 * (positions[i, 0, 2] + positions[i, 1, 2])
         else:
             planes[k] = positions[i, 1 - swings[i], 2]
-        count = counts[k] = _convex_hull(points, n, hull)
+        count = counts[k] = hull_of(points, n, hull)
         if count > MAX_EDGES:
             raise ValueError("a support polygon has more than MAX_EDGES edges")
         for e in range(count):
@@ -109,7 +109,7 @@ def horizon_polygons(
 
 
 @kernel
-def _convex_hull(points: Vector, n: int, hull: Vector) -> int:
+def hull_of(points: Vector, n: int, hull: Vector) -> int:
     """Number of vertices, written into `hull`, of the first `n` points, which get sorted: see `convex_hull`."""
     for i in range(1, n):  # sixteen points at most: by insertion
         x, y = points[i, 0], points[i, 1]
