@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 from whole_body_case import PREVIEW, ROBOT, SETTINGS, arguments, random_problem, solve, stage, velocity_tasks
 
 from wbmpc.planner.joint_velocities import JointVelocities
+from wbmpc.qp import make_workspace
 from wbmpc.signals import Vector
 
 ASKING, MOVING = stage(ask_shift=True), stage(ask_shift=False)
@@ -82,3 +83,13 @@ def test_a_velocity_that_no_joint_can_follow_is_paid_in_full() -> None:
     assert cost is not None
     assert_allclose(cost.gradient, SETTINGS.com_velocity_cost * np.array([0.1, -0.2]))
     assert_allclose(cost.curvature, SETTINGS.com_velocity_cost * np.eye(2))
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), x=speeds, y=speeds, tight=st.floats(0.01, 2.0))
+def test_the_guess_of_held_joints_ends_where_the_backend_does(seed: int, x: float, y: float, tight: float) -> None:
+    joints = JointVelocities(ROBOT.nv, SETTINGS, backend="daqp")
+    joints.take(replace(velocity_tasks(np.random.default_rng(seed)), lower=-np.full(ROBOT.nv, tight)))
+    for velocity in (np.array([x, y]), np.array([y, -x])):
+        solution, _ = joints.solve(velocity)
+        assert_allclose(solution.x, make_workspace("daqp", joints.problem).solve().x, atol=1e-6)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import perf_counter
 
 import numpy as np
 
 from wbmpc.jit import kernel
+from wbmpc.planner.box_kernel import solve_box
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
-from wbmpc.signals import Vector
+from wbmpc.signals import SolveStatus, Vector
 
 FOOT_ROWS = 12  # two soles, six rows each
 
@@ -66,6 +68,7 @@ class JointVelocities:
         self._workspace = make_workspace(backend, self.problem)
         self._tasks: VelocityTasks | None = None
         self._fresh = True
+        self._held = np.zeros(velocities, dtype=np.int64)  # at the last optimum: 1 at its upper bound, -1 at its lower
         self._base_gradient = np.zeros(velocities)
         self.cost: VelocityCost | None = None  # as last solved for these tasks
 
@@ -88,10 +91,20 @@ class JointVelocities:
         qp.x_lower[:], qp.x_upper[:] = tasks.lower, tasks.upper
 
     def solve(self, velocity: Vector) -> tuple[QpSolution, VelocityCost | None]:
-        """q̇ (nv,) for the CoM velocity `velocity` (2,) [m/s], and V there; None when the solve failed."""
+        """q̇ (nv,) for the CoM velocity `velocity` (2,) [m/s], and V there; None when the solve failed.
+
+        The joints held at their bounds are few and mostly those of the last plan; where that guess does not lead to the
+        optimum the backend is asked.
+        """
         assert self._tasks is not None
+        start = perf_counter()
         qp, weight, jacobian = self.problem, self._settings.com_velocity_cost, self._tasks.com_jacobian
         qp.gradient[:] = self._base_gradient - weight * (velocity @ jacobian[:2])
+        box = (qp.hessian, qp.gradient, qp.x_lower, qp.x_upper)
+        rounds, x, slope, curvature = solve_box(*box, jacobian, velocity, weight, self._held)
+        if rounds:
+            self.cost = VelocityCost(velocity, slope, curvature)
+            return QpSolution(x, SolveStatus.SOLVED, rounds, perf_counter() - start), self.cost
         solution = self._workspace.solve(matrices_changed=self._fresh)
         self._fresh, self.cost = not solution.solved, None
         if solution.solved:
