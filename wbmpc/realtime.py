@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -24,6 +25,7 @@ from wbmpc.timing import LoopTiming
 
 SPIN = 3e-4  # [s] before a deadline in which the tick thread no longer trusts a sleep to end in time
 SWITCH_INTERVAL = 1e-4  # [s] after which the tick thread, awake, gets the interpreter back from the planner
+PRIORITY = 10  # of SCHED_FIFO, 1 … 99: before everything ordinary, behind what the system itself does
 WARM_UP_TICKS = 20  # made in a session that is thrown away: first calls load libraries and compile
 
 
@@ -84,7 +86,13 @@ def run_realtime(
         if due:
             worker.request(state)
 
-    with _planner(scenario, session) as planner, PlannerThread(planner, finished) as worker, _undisturbed():
+    with (
+        _planner(scenario, session) as planner,
+        PlannerThread(planner, finished) as worker,
+        _undisturbed(),
+        _ahead_of_others() as ahead,
+    ):
+        timing.realtime_priority = ahead
         start = perf_counter()
         for k in range(session.ticks):
             slot = start + k * step
@@ -191,6 +199,27 @@ def _planner(scenario: Scenario, session: Session) -> Iterator[AnyPlanner]:
         return
     with PlannerProcess(scenario) as planner:
         yield planner
+
+
+@contextmanager
+def _ahead_of_others() -> Iterator[bool]:
+    """Real-time priority for this thread, if the system grants it; gives whether it did.
+
+    Where every core has work, a thread like any other waits for its turn for several milliseconds, now and then.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        yield False
+        return
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except PermissionError:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        os.sched_setscheduler(0, *before)
 
 
 @contextmanager
