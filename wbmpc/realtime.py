@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import perf_counter, sleep
@@ -160,11 +160,14 @@ class PlannerThread:
         self._thread.join()
 
     def _run(self) -> None:
+        # A thread that only hands over to a process must not wait for a core that this process keeps busy.
+        hands_over = isinstance(self._planner, PlannerProcess)
         try:
-            while (snapshot := self._newest()) is not None:
-                self._at = snapshot.time
-                # Ready is ready: whichever tick comes next may use it.
-                self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
+            with _ahead_of_others() if hands_over else nullcontext():
+                while (snapshot := self._newest()) is not None:
+                    self._at = snapshot.time
+                    # Ready is ready: whichever tick comes next may use it.
+                    self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
         except BaseException as error:  # a thread cannot raise into another: `check` does
             self._error = error
 
