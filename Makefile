@@ -41,10 +41,15 @@ pictures: setup
 	$(BIN)/wbmpc plot $(patsubst scenarios/%.yaml,$(OUT)/%.rrd,$(wildcard scenarios/*.yaml)) --out docs/pictures
 	$(BIN)/python docs/scenarios_page.py
 
-# All benchmarks, peers included, into docs/benchmarks.md and docs/profile.md; one of them: PARTS=tracker.
+# All benchmarks, peers included, into docs/benchmarks.md, docs/benchmarks_stage3.md and docs/profile.md, about half an
+# hour on a machine with nothing else to do; one of the first file's: PARTS=tracker.
 PARTS ?=
 bench: setup peers
 	$(BIN)/python -m benchmarks $(PARTS) --write docs
+ifeq ($(PARTS),)
+	$(BIN)/python -m benchmarks.stage3_env
+	.venv-peers-stage3/bin/python -m benchmarks.stage3_peers
+endif
 
 setup: $(STAMP)
 

@@ -19,15 +19,16 @@ from short_run import ROBOT, finished, new_recorder, stand
 from wbmpc import realtime
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
+from wbmpc.planner_process import PlannerProcess
 from wbmpc.realtime import PlannerThread, run_realtime
 from wbmpc.signals import RobotState
 from wbmpc.timing import LoopTiming, Schedule
 
-STAND = stand()
+STAND = stand(loop__realtime_planner="thread")
 
 
 def test_a_standing_robot_in_real_time() -> None:
-    scenario = stand(duration=0.5)
+    scenario = stand(duration=0.5, loop__realtime_planner="thread")
     threads, progress = active_count(), []
     timing, recorder = finished(scenario, run=run_realtime, on_progress=progress.append)
     assert recorder.ticks == 500
@@ -48,10 +49,11 @@ def test_a_standing_robot_in_real_time() -> None:
     assert active_count() == threads
 
 
-def test_without_late_plans_it_is_the_lockstep_run(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("where", ["process", "thread"])
+def test_without_late_plans_it_is_the_lockstep_run(where: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ticks of 40 ms: the planner has 0.4 s for each plan, and every plan waits until its delay is over."""
     monkeypatch.setattr(realtime, "_wait_until", lambda deadline: sleep(0.04) or 0.0)  # type: ignore[func-returns-value]
-    scenario = stand(duration=0.06, sensors__noise_scale=1.0, seed=5)
+    scenario = stand(duration=0.06, sensors__noise_scale=1.0, seed=5, loop__realtime_planner=where)
     timing, recorder = finished(scenario, run=run_realtime)
     if timing.late_plans or timing.skipped_plans:
         pytest.skip("no plan in 0.4 s: the machine is too slow to tell")
@@ -63,7 +65,7 @@ def test_without_late_plans_it_is_the_lockstep_run(monkeypatch: pytest.MonkeyPat
 
 def test_replay_in_lockstep_repeats_the_bits() -> None:
     """What makes a threaded run unrepeatable is when its plans are ready: charge that, and nothing else is left."""
-    scenario = stand(duration=0.3, sensors__noise_scale=1.0, seed=5)
+    scenario = stand(duration=0.3, sensors__noise_scale=1.0, seed=5, loop__realtime_planner="thread")
     timing, recorder = finished(scenario, run=run_realtime)
     assert timing.effects
     assert all(effect > snapshot for snapshot, effect in zip(timing.snapshots, timing.effects, strict=True))
@@ -85,7 +87,7 @@ def test_an_error_of_the_planner_surfaces(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(Planner, "solve", failing)
     threads, interval = active_count(), sys.getswitchinterval()
-    recorder = new_recorder(scenario := stand(duration=2.0))
+    recorder = new_recorder(scenario := stand(duration=2.0, loop__realtime_planner="thread"))
     with pytest.raises(RuntimeError, match=r"snapshot of 0.0\d0 s: ZeroDivisionError: the third plan") as raised:
         run_realtime(scenario, robot=ROBOT, recorder=recorder)
     assert isinstance(raised.value.__cause__, ZeroDivisionError)
@@ -188,7 +190,7 @@ def test_the_planner_takes_the_newest_snapshot_and_leaves_out_older_ones() -> No
 
 def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast the machine, each plan waits for 35 ticks: they go on, on the tail of the plan before."""
-    solve, recorder = Planner.solve, new_recorder(scenario := stand(duration=0.4))
+    solve, recorder = Planner.solve, new_recorder(scenario := stand(duration=0.4, loop__realtime_planner="thread"))
     give_up = perf_counter() + 120.0
 
     def slow(planner: Planner, state: RobotState) -> Any:
@@ -219,3 +221,11 @@ def test_mailbox_gives_each_plan_once_and_never_early() -> None:
     assert mailbox.arrived(0.020) == ["b", "c"]
     assert mailbox.latest(0.020) == "c"
     assert mailbox.arrived(0.030) == []
+
+
+def test_a_planner_that_dies_in_its_process_is_missed() -> None:
+    with PlannerProcess(STAND) as planner:
+        planner._worker.process.kill()
+        with pytest.raises(RuntimeError, match=r"the planner is gone: its process was killed by SIGKILL"):
+            planner.solve(RobotState(0.01, ROBOT.home_q, np.zeros(ROBOT.nv), np.zeros((2, 6)), np.zeros((2, 3)), 1.0))
+    assert not planner._worker.process.is_alive()

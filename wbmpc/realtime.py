@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import perf_counter, sleep
@@ -24,6 +25,7 @@ from wbmpc.timing import LoopTiming
 
 SPIN = 3e-4  # [s] before a deadline in which the tick thread no longer trusts a sleep to end in time
 SWITCH_INTERVAL = 1e-4  # [s] after which the tick thread, awake, gets the interpreter back from the planner
+PRIORITY = 10  # of SCHED_FIFO, 1 … 99: before everything ordinary, behind what the system itself does
 WARM_UP_TICKS = 20  # made in a session that is thrown away: first calls load libraries and compile
 
 
@@ -84,7 +86,13 @@ def run_realtime(
         if due:
             worker.request(state)
 
-    with _planner(scenario, session) as planner, PlannerThread(planner, finished) as worker, _undisturbed():
+    with (
+        _planner(scenario, session) as planner,
+        PlannerThread(planner, finished) as worker,
+        _undisturbed(),
+        _ahead_of_others() as ahead,
+    ):
+        timing.realtime_priority = ahead
         start = perf_counter()
         for k in range(session.ticks):
             slot = start + k * step
@@ -152,11 +160,14 @@ class PlannerThread:
         self._thread.join()
 
     def _run(self) -> None:
+        # A thread that only hands over to a process must not wait for a core that this process keeps busy.
+        hands_over = isinstance(self._planner, PlannerProcess)
         try:
-            while (snapshot := self._newest()) is not None:
-                self._at = snapshot.time
-                # Ready is ready: whichever tick comes next may use it.
-                self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
+            with _ahead_of_others() if hands_over else nullcontext():
+                while (snapshot := self._newest()) is not None:
+                    self._at = snapshot.time
+                    # Ready is ready: whichever tick comes next may use it.
+                    self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
         except BaseException as error:  # a thread cannot raise into another: `check` does
             self._error = error
 
@@ -191,6 +202,27 @@ def _planner(scenario: Scenario, session: Session) -> Iterator[AnyPlanner]:
         return
     with PlannerProcess(scenario) as planner:
         yield planner
+
+
+@contextmanager
+def _ahead_of_others() -> Iterator[bool]:
+    """Real-time priority for this thread, if the system grants it; gives whether it did.
+
+    Where every core has work, a thread like any other waits for its turn for several milliseconds, now and then.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        yield False
+        return
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except PermissionError:
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        os.sched_setscheduler(0, *before)
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from wbmpc.signals import Vector
 from wbmpc.timing import LoopTiming
 from wbmpc.verdict import Verdict, solver_statistics
 from wbmpc.versions import versions
+from wbmpc.warm_up import compile_kernels
 
 PATCH_DRAWN = 0.02  # [m] half edge of the square that stands for a candidate contact in the recording
 
@@ -59,6 +60,7 @@ def run_scenario(
         WbmpcError: the robot cannot be read, or the recording not written.
     """
     started = perf_counter()
+    compile_kernels()
     robot = Robot.load(robot_path(scenario))
     model = build_world(scenario, robot_path(scenario))
     patches = resolve_patches(scenario)

@@ -42,6 +42,7 @@ class LoopTiming:
         self._ticks = 0
         self.timestep = nan  # [s]
         self.realtime = False  # whether there was a wall clock to keep up with
+        self.realtime_priority = False  # whether the ticks' thread came before all ordinary ones
         self.wall_time = 0.0  # [s] of the loop
         self.simulated_time = 0.0  # [s]
         self.missed_deadlines = 0  # ticks that began more than a timestep late; 0 in lockstep
@@ -111,6 +112,7 @@ class LoopTiming:
             **_percentiles("tick_late", self.tick_late if self.realtime else ()),
             **_percentiles("tick_time", self.tick_time),
             "ticks": self._ticks,
+            "realtime_priority": float(self.realtime_priority),
             "missed_deadlines": self.missed_deadlines,
             "plans": len(self.effects),
             "planner_rate": len(self.effects) / self.wall_time if self.realtime and ran else nan,

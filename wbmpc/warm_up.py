@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from threading import Timer
 
@@ -26,8 +27,12 @@ EVERYTHING = {  # a contact is needed and chosen in the first plan
 }
 
 
+@cache
 def compile_kernels() -> None:
-    """Make a few ticks and plans in memory, which compiles every kernel or loads it; says so when it takes a while."""
+    """Make a few ticks and plans in memory, which compiles every kernel or loads it; says so when it takes a while.
+
+    Once in a process; a second call does nothing.
+    """
     scenario, findings = validate(EVERYTHING, source=Path("warm_up"))
     assert scenario is not None, findings
     brief = scenario.model_copy(update={"duration": BRIEF})
