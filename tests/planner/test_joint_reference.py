@@ -46,7 +46,7 @@ def test_the_tasks_are_those_of_the_kinematics(seed: int) -> None:
         assert_allclose(tasks.foot_jacobian[rows], kinematics.jacobian(frame), atol=1e-12)
         turn = rotation_error(desired=level_frame(soles.yaws[side]), measured=kinematics.rotation(frame))
         pull = rate * np.concatenate([soles.positions[side] - kinematics.position(frame), turn])
-        expected = pull + [*soles.velocities[side], 0.0, 0.0, soles.yaw_rates[side]]
+        expected = pull + np.array([*soles.velocities[side], 0.0, 0.0, soles.yaw_rates[side]])
         assert_allclose(tasks.foot_velocity[rows], expected, atol=1e-9)
         rows = slice(3 * side, 3 * side + 3)
         assert_allclose(tasks.hand_jacobian[rows], kinematics.jacobian(palm)[:3], atol=1e-12)

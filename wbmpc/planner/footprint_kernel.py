@@ -1,4 +1,4 @@
-"""Soles and what lies under them, seen from above, in compiled loops: a search for a foothold asks thousands of times."""
+"""Soles and what lies under them, seen from above, in compiled loops: a search asks thousands of times."""
 
 from __future__ import annotations
 

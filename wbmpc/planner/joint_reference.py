@@ -33,7 +33,7 @@ class JointReference:
         self._chains = chains_of(robot.pin_model, frames)
         self._pulls = Pulls(settings.tracking_rate, settings.torso_rate, settings.posture_rate)
         self._limits = np.array([robot.joint_lower, robot.joint_upper, SPEED_SHARE * robot.joint_speed])
-        self._weights = {active: self._weight(active) for active in product((False, True), repeat=2)}
+        self._weights = {(left, right): self._weight((left, right)) for left, right in product((False, True), repeat=2)}
         self._palms, self._palm_velocities = np.zeros((2, 3)), np.zeros((2, 3))  # of the references
         self._palm_jacobian, self._torso_jacobian = np.zeros((6, robot.nv)), np.zeros((3, robot.nv))
         self.q = q.copy()  # (nq,)
@@ -89,8 +89,17 @@ class JointReference:
             active[side] = 0.0 if mode == HandMode.FREE else 1.0
         self._kinematics.update_kinematics(self.q)
         wanted = Wanted(
-            *(np.ascontiguousarray(com), soles.positions, soles.velocities, soles.yaws, soles.yaw_rates),
-            *(palms, velocities, active, posture, torso_up, torso_heading),
+            com=np.ascontiguousarray(com),
+            soles=soles.positions,
+            sole_velocities=soles.velocities,
+            sole_yaws=soles.yaws,
+            sole_yaw_rates=soles.yaw_rates,
+            palms=palms,
+            palm_velocities=velocities,
+            active=active,
+            posture=posture,
+            torso_up=torso_up,
+            torso_heading=torso_heading,
         )
         com_jacobian, com_correction, feet, foot_velocity, self._palm_jacobian, hand_velocity, *rest = linearise(
             self._views, *self._chains, self._pulls, self.q, self._limits, wanted

@@ -1,4 +1,4 @@
-"""One iteration of a posture's inverse kinematics in one compiled call; tests/planner/plain_posture.py says the same."""
+"""One iteration of a posture in one compiled call; tests/planner/plain_posture.py says the same in numpy."""
 
 from __future__ import annotations
 
