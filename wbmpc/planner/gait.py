@@ -46,7 +46,7 @@ class Gait:
         self._late = 0.0  # [s] since the foot should have landed
         self._made: dict[tuple[int, float], SupportPolygon] = {}  # polygons of the feet as they stand, by swing, margin
         self._made_on = feet
-        self._stood: tuple[Feet, float, float, SupportPreview] | None = None  # feet, margin, growth, what they gave
+        self._stood: tuple[Feet, Vector, tuple[float, float], SupportPreview] | None = None  # the last one of STAND
 
     # ------------------------------------------------------------------ now
 
@@ -192,8 +192,10 @@ class Gait:
             com: (N, 3) where the CoM will be [m], roughly.
         """
         stands = self.phase == SupportPhase.STAND and not self._stepping.has_commands
-        if stands and self._stood is not None and self._stood[0] is self.feet and self._stood[1:3] == (margin, growth):
-            return self._stood[3]  # nothing changes while the robot stands on level ground
+        if stands and self._stood is not None:
+            feet, knots, insets, stood = self._stood
+            if feet is self.feet and knots is times and insets == (margin, growth):
+                return stood  # nothing changes while the robot stands on level ground
         intervals, steps = self._intervals(time, float(times[-1]), rate)
         standing = [float(self.feet.positions[side, 2]) for side in range(2) if self.stance[side]]
         horizon = SupportHorizon(intervals, times, standing=standing)
@@ -206,7 +208,7 @@ class Gait:
             bounds=FootstepBounds.of(self._settings, self.feet, steps, swing=self.swing, left=self._left),
         )
         if stands and horizon.plane is None:
-            self._stood = (self.feet, margin, growth, preview)
+            self._stood = (self.feet, times, (margin, growth), preview)
         return preview
 
     def goal_polygon(self, margin: float) -> SupportPolygon:
