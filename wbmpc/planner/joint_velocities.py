@@ -65,7 +65,7 @@ class JointVelocities:
         """`velocities`: nv."""
         self._settings = settings
         self.problem = QuadraticProgram(velocities, 0)
-        self._workspace = make_workspace(backend, self.problem)
+        self._workspace, self._guesses = make_workspace(backend, self.problem), backend == "daqp"
         self._tasks: VelocityTasks | None = None
         self._fresh = True
         self._held = np.zeros(velocities, dtype=np.int64)  # at the last optimum: 1 at its upper bound, -1 at its lower
@@ -94,17 +94,18 @@ class JointVelocities:
         """q̇ (nv,) for the CoM velocity `velocity` (2,) [m/s], and V there; None when the solve failed.
 
         The joints held at their bounds are few and mostly those of the last plan; where that guess does not lead to the
-        optimum the backend is asked.
+        optimum the backend is asked. Any other backend than the default one is asked at once.
         """
         assert self._tasks is not None
         start = perf_counter()
         qp, weight, jacobian = self.problem, self._settings.com_velocity_cost, self._tasks.com_jacobian
         qp.gradient[:] = self._base_gradient - weight * (velocity @ jacobian[:2])
-        box = (qp.hessian, qp.gradient, qp.x_lower, qp.x_upper)
-        rounds, x, slope, curvature = solve_box(*box, jacobian, velocity, weight, self._held)
-        if rounds:
-            self.cost = VelocityCost(velocity, slope, curvature)
-            return QpSolution(x, SolveStatus.SOLVED, rounds, perf_counter() - start), self.cost
+        if self._guesses:
+            box = (qp.hessian, qp.gradient, qp.x_lower, qp.x_upper)
+            rounds, x, slope, curvature = solve_box(*box, jacobian, velocity, weight, self._held)
+            if rounds:
+                self.cost = VelocityCost(velocity, slope, curvature)
+                return QpSolution(x, SolveStatus.SOLVED, rounds, perf_counter() - start), self.cost
         solution = self._workspace.solve(matrices_changed=self._fresh)
         self._fresh, self.cost = not solution.solved, None
         if solution.solved:
