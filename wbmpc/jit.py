@@ -11,6 +11,7 @@ import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
 _STAMP = "_source_stamp"
+KERNELS: list[Any] = []  # all that this process has imported, in order
 
 
 def kernel(function: F) -> F:
@@ -30,18 +31,24 @@ def short_kernel(function: F) -> F:
     return _compiled(function, nogil=False)
 
 
+def uncached() -> int:
+    """How many of KERNELS have no code kept from an earlier process."""
+    files = [getattr(getattr(kernel, "_cache", None), "_cache_file", None) for kernel in KERNELS]
+    return sum(file is None or not file._load_index() for file in files)
+
+
 def _compiled(function: F, *, nogil: bool) -> F:
     options = {"nogil": nogil, "error_model": "numpy"}
     try:
         compiled: F = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no folder to keep code in: every process compiles for itself
         compiled = numba.njit(**options)(function)
-    stamp = _stamp(function)
     cache = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
     if hasattr(cache, _STAMP):  # numba itself looks at the file of the kernel only, not at those it calls
+        stamp = _stamp(function)
         setattr(cache, _STAMP, stamp)
-    if not numba.config.DISABLE_JIT:
         setattr(compiled, _STAMP, stamp)
+    KERNELS.append(compiled)
     return compiled
 
 

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial import ConvexHull, QhullError
 
 from wbmpc.planner.support import MAX_EDGES, SupportPolygon, convex_hull, foot_corners
+from wbmpc.planner.support_kernel import hull_of
 from wbmpc.signals import Vector
 
 HALF = np.array([0.06, 0.035])
@@ -37,6 +38,26 @@ def test_hull_is_scipys(points: Vector) -> None:
     # ours has corners only: the turn at every vertex is strictly to the left
     ahead, behind = np.roll(hull, -1, axis=0) - hull, hull - np.roll(hull, 1, axis=0)
     assert (behind[:, 0] * ahead[:, 1] - behind[:, 1] * ahead[:, 0] > 0).all()
+
+
+@given(
+    yaw=st.floats(-13, -6).map(lambda e: 10.0**e),
+    other=st.floats(-13, -6).map(lambda e: -(10.0**e)),
+    x=st.floats(-0.3, 0.3),
+    ahead=st.sampled_from([0.0, 1e-10, 1e-8, 0.07]),
+)
+def test_sides_that_are_straight_but_for_rounding_lose_no_corner(
+    yaw: float, other: float, x: float, ahead: float
+) -> None:
+    feet = [(np.array([x, 0.06]), yaw), (np.array([x + ahead, -0.06]), other)]
+    points = np.vstack([foot_corners(position=p, yaw=angle, half_extents=HALF) for p, angle in feet])
+    hull = convex_hull(points)
+    for angle in 2 * np.pi * np.arange(16) / 16:
+        u = np.array([np.cos(angle), np.sin(angle)])
+        assert (hull @ u).max() == pytest.approx((points @ u).max(), abs=1e-6)
+    assert len(hull) <= MAX_EDGES
+    room = np.empty((16, 2))
+    assert_allclose(room[: hull_of(points.copy(), 8, room)], hull)
 
 
 @given(x=millimetres, y=millimetres, yaw=st.floats(-7, 7))

@@ -35,12 +35,15 @@ def horizontal_band(references: Vector, distance: Vector) -> Vector:
 
     Where two end-effectors disagree the band is the point between their bounds.
     """
-    ends, n = references.shape[:2]
-    return _meet(references, np.broadcast_to(distance if distance.ndim == 3 else distance[:, None], (ends, n, 2)))
+    places = np.ascontiguousarray(references[:, :, :2])  # one memory layout, one compilation
+    each = np.empty_like(places)
+    each[:] = distance if distance.ndim == 3 else distance[:, None]
+    return _meet(places, each)
 
 
 @kernel
 def _meet(references: Vector, distance: Vector) -> Vector:
+    """The band of `references` (ends, N, 2) and distances (ends, N, 2), both C-contiguous."""
     ends, n = references.shape[0], references.shape[1]
     band = np.empty((2, n, 2))
     for axis in range(2):

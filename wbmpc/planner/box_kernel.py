@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.jit import kernel
-from wbmpc.planner.cholesky import factor, substitute
+from wbmpc.qp.cholesky import factor, substitute
 from wbmpc.signals import Vector
 
 MOST_ROUNDS = 8
@@ -28,8 +28,9 @@ def solve_box(
 
     The variables `held` (n,), 1 at the upper bound and -1 at the lower, stay there, the others are free; whoever of
     these leaves its bounds is held, and whoever is held against its multiplier's sign is freed, until nobody changes:
-    then all conditions of the optimum hold. `held` is left as found. g holds −w Jᵀ v for the target v = `velocity`
-    (2,), J the first two rows of `jacobian`:   ∇V = w (v − J x),   ∇²V = w (1 − w J_f H_ff⁻¹ J_fᵀ)   over the free f.
+    then all conditions of the optimum hold. `held` is overwritten: by the set of the optimum, a guess for the next
+    time, or by zeros where none was found. g holds −w Jᵀ v for the target v = `velocity` (2,), J the first two rows of
+    `jacobian`:   ∇V = w (v − J x),   ∇²V = w (1 − w J_f H_ff⁻¹ J_fᵀ)   over the free f.
     """
     n = len(gradient)
     x, U, free = np.empty(n), np.empty((n, n)), np.empty(n, np.int64)

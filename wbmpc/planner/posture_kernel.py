@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wbmpc.frame_terms import frame_rows, turn_to_level
 from wbmpc.jit import kernel
-from wbmpc.planner.cholesky import factor, substitute
+from wbmpc.qp.cholesky import factor, substitute
 from wbmpc.signals import Vector
 
 SOLE_COST, PALM_COST, ELBOW_COST, HEIGHT_COST, POSTURE_COST = 1e4, 1e3, 3e2, 3.0, 2e-3

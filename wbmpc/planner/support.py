@@ -10,7 +10,8 @@ from wbmpc.jit import kernel
 from wbmpc.signals import Vector
 
 PROJECTIONS = 20
-COLLINEAR = 1e-9  # [m²] twice the area of three points on one line: ten times what the order's rounding lets through
+CELLS = 1e7  # [1/m] the hull is found among points on a grid of 0.1 µm, on which its sums are exact
+COLLINEAR = 1e-7 * CELLS**2  # twice the area of three points on one line: a bump of a few cells on the longest side
 UNEVEN = 0.005  # [m] smaller differences of two soles' heights are the estimate's
 MAX_EDGES = 8  # two rectangles have a hull of at most eight edges
 
@@ -30,22 +31,33 @@ def foot_corners(*, position: Vector, yaw: float, half_extents: Vector) -> Vecto
 
 def convex_hull(points: Vector) -> Vector:
     """Convex hull (k, 2) of points (n, 2), counter-clockwise, collinear points dropped (monotone chain)."""
-    y, x = points[:, 1].round(9), points[:, 0].round(9)  # rounded: of a side turned by 1e-16 no corner may be lost
-    order = points[np.lexsort((y, x))].tolist()
+    cells = np.rint(CELLS * points)
+    order = points[np.lexsort((cells[:, 1], cells[:, 0]))]
 
-    def chain(sequence: list[list[float]]) -> list[list[float]]:
-        hull: list[list[float]] = []
+    def chain(sequence: Vector) -> list[Vector]:
+        hull: list[Vector] = []
         for p in sequence:
-            while len(hull) >= 2:
-                (ax, ay), (bx, by) = hull[-2], hull[-1]
-                if (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax) > COLLINEAR:
-                    break
+            while len(hull) >= 2 and not is_corner(hull[-2], hull[-1], p):
                 hull.pop()
             hull.append(p)
         return hull
 
     lower, upper = chain(order), chain(order[::-1])
     return np.array(lower[:-1] + upper[:-1])
+
+
+@kernel
+def is_corner(a: Vector, b: Vector, p: Vector) -> bool:
+    """Whether the way a → b → p (2,) turns left at b, for good or because it goes back; decided on the grid.
+
+    Rounding may neither change a turn's sign, which the grid rules out, nor may a side that is all but along y lose its
+    end: where the turn is small, b is left out only when it lies between the others.
+    """
+    bx, by = np.rint(CELLS * b[0]), np.rint(CELLS * b[1])
+    ux, uy = bx - np.rint(CELLS * a[0]), by - np.rint(CELLS * a[1])
+    vx, vy = np.rint(CELLS * p[0]) - bx, np.rint(CELLS * p[1]) - by
+    turn = ux * vy - uy * vx
+    return turn > COLLINEAR or (turn > 0.0 and ux * vx + uy * vy < 0.0)
 
 
 @dataclass(frozen=True, slots=True)

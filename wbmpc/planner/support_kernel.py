@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.jit import kernel
-from wbmpc.planner.support import COLLINEAR, MAX_EDGES
+from wbmpc.planner.support import CELLS, MAX_EDGES, is_corner
 from wbmpc.signals import Vector
 
 MAX_POINTS = 16  # corners of w_L P_L ⊕ w_R P_R
@@ -113,8 +113,12 @@ def hull_of(points: Vector, n: int, hull: Vector) -> int:
     """Number of vertices, written into `hull`, of the first `n` points, which get sorted: see `convex_hull`."""
     for i in range(1, n):  # sixteen points at most: by insertion
         x, y = points[i, 0], points[i, 1]
+        key, minor = np.rint(CELLS * x), np.rint(CELLS * y)
         j = i
-        while j > 0 and _after(points[j - 1, 0], points[j - 1, 1], x, y):
+        while j > 0:
+            ahead = np.rint(CELLS * points[j - 1, 0]) - key
+            if ahead < 0.0 or (ahead == 0.0 and np.rint(CELLS * points[j - 1, 1]) <= minor):
+                break
             points[j] = points[j - 1]
             j -= 1
         points[j, 0], points[j, 1] = x, y
@@ -124,18 +128,8 @@ def hull_of(points: Vector, n: int, hull: Vector) -> int:
             count -= 1  # the last point of the lower chain is the first of the upper one
             floor = count
         p = points[step if step < n else 2 * n - 1 - step]
-        while count >= floor + 2:
-            ax, ay, bx, by = hull[count - 2, 0], hull[count - 2, 1], hull[count - 1, 0], hull[count - 1, 1]
-            if (bx - ax) * (p[1] - ay) - (by - ay) * (p[0] - ax) > COLLINEAR:
-                break
+        while count >= floor + 2 and not is_corner(hull[count - 2], hull[count - 1], p):
             count -= 1
         hull[count] = p
         count += 1
     return count - 1
-
-
-@kernel
-def _after(ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a comes after b in the hull's order, both rounded: of a side turned by 1e-16 no corner may be lost."""
-    ahead = np.rint(ax * 1e9) - np.rint(bx * 1e9)
-    return ahead > 0.0 or (ahead == 0.0 and np.rint(ay * 1e9) > np.rint(by * 1e9))

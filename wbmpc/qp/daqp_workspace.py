@@ -9,6 +9,7 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.qp.active_set import solve_from_guess
 from wbmpc.qp.problem import QuadraticProgram
 from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
@@ -41,15 +42,20 @@ _STATUS = {
 class DaqpWorkspace:
     """One persistent `daqp.Model`: `update` keeps memory and active set (see benchmarks/qp_backends.py).
 
-    A failure from a warm start is confirmed by one cold start before it is reported, so that a bad history costs time
-    and never a solution.
+    The active set of the last solve is tried first, in one compiled call: mostly it, or one near it, is the optimum's
+    again, and the 20 to 40 µs that handing the data to daqp takes are saved. A failure from a warm start is confirmed
+    by one cold start before it is reported, so that a bad history costs time and never a solution.
     """
 
     def __init__(self, problem: QuadraticProgram) -> None:
         self.problem = problem
         self._sense = soft_sense(problem)
         self._reciprocal = soft_reciprocal(problem)
+        self._softness = np.zeros(problem.rows)
+        self._softness[problem.soft_rows] = 1.0 / problem.soft_weight[problem.soft_rows]
+        self._active = np.zeros(problem.all_lower.size, dtype=np.int8)
         self._model: daqp.Model | None = None  # None: nothing to warm-start from
+        self._stale = False  # the model has not seen the matrices of the last solve
 
     def solve(self, *, matrices_changed: bool = True) -> QpSolution:
         """See `QpWorkspace.solve`."""
@@ -60,9 +66,17 @@ class DaqpWorkspace:
             if matrices_changed:
                 self._model = None  # its factorisation no longer belongs to the matrices
             return failed(problem, defect, 0, perf_counter() - start)
+        self._stale |= matrices_changed
+        rounds, x = solve_from_guess(
+            *(problem.hessian, problem.gradient, problem.matrix, problem.all_lower, problem.all_upper),
+            *(self._softness, self._active),
+        )
+        if rounds:
+            return QpSolution(x, SolveStatus.SOLVED, rounds, perf_counter() - start)
         if self._model is not None:
             # Without `sense`, update keeps the last active set; with it daqp starts cold.
-            if matrices_changed:
+            if self._stale:
+                self._stale = False
                 matrix = problem.matrix if problem.rows else None  # the wrapper cannot update an empty matrix
                 flag = self._model.update(
                     problem.hessian, problem.gradient, matrix, problem.all_upper, problem.all_lower
@@ -72,9 +86,10 @@ class DaqpWorkspace:
             if flag >= 0:
                 x, cost, flag, info = self._model.solve()
                 if _status(flag, x) is SolveStatus.SOLVED and self._is_optimal(x, cost, info["lam"]):
+                    np.sign(info["lam"], out=self._active, casting="unsafe")
                     return QpSolution(x, SolveStatus.SOLVED, info["iterations"], perf_counter() - start)
         model, x, status, iterations = solve_cold(problem, self._sense, self._reciprocal)
-        self._model = model if status is SolveStatus.SOLVED else None
+        self._model, self._stale = model if status is SolveStatus.SOLVED else None, False
         if status is SolveStatus.SOLVED:
             return QpSolution(x, status, iterations, perf_counter() - start)
         return failed(problem, status, iterations, perf_counter() - start)

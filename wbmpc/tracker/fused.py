@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from wbmpc.frame_terms import chains_of
 from wbmpc.robot import Robot
-from wbmpc.signals import RobotState, Setpoint
+from wbmpc.signals import RobotState, Setpoint, Vector
 from wbmpc.tracker.clearance import CLEARANCE_ROWS
 from wbmpc.tracker.fused_program import build
 from wbmpc.tracker.program import FORCES, TrackerProgram
@@ -62,7 +62,7 @@ class FusedAssembly:
         chains, lengths = chains_of(self._model, frames)
         limits = np.array([robot.joint_lower, robot.joint_upper, robot.joint_speed, robot.torque_limit])
         self._constants = (chains, lengths, limits, np.array([robot.damping, robot.frictionloss]), robot.mass)
-        self._com_integral, self._hand_integral = np.zeros(3), np.zeros((2, 3))
+        self._com_integral, self._hand_integral, self._sensed = np.zeros(3), np.zeros((2, 3)), np.zeros(2)
         weight = TaskStack(robot, settings, step=step).weight  # constant for CoM, momentum and torso
         assert weight[MOMENTUM].all() or settings.momentum_weight == 0.0
         assert weight[TORSO].all() or settings.torso_weight == 0.0
@@ -71,7 +71,7 @@ class FusedAssembly:
             *(np.zeros((TASK_ROWS, nv)), np.zeros(TASK_ROWS), weight),
             *(np.zeros((CLEARANCE_ROWS, nv)), np.zeros(CLEARANCE_ROWS)),
             *(np.zeros((FORCES, nv)), np.zeros(n), np.zeros(n), np.zeros(n)),
-            *(self._com_integral, self._hand_integral, np.zeros(2)),
+            *self.memory,
         )
         self._qp = (qp.hessian, qp.gradient, qp.matrix, qp.lower, qp.upper, qp.x_lower, qp.x_upper)
         self._answer = (
@@ -96,6 +96,11 @@ class FusedAssembly:
             *(self._setpoint, self._gains, self._step, now),
             *(self._pin, self._constants, self._scratch, self._qp, self._answer),
         )
+
+    @property
+    def memory(self) -> tuple[Vector, ...]:
+        """All that one tick leaves to the next: integrals of CoM and palms, filtered palm forces."""
+        return self._com_integral, self._hand_integral, self._sensed
 
     def forget(self) -> None:
         """Clear the integrals, see `TaskStack.forget`."""

@@ -50,6 +50,11 @@ class PlainAssembly:
         self._contacts(self._kinematics, setpoint, state.palm_force_in_world)
         self._assemble(state, setpoint)
 
+    @property
+    def memory(self) -> tuple[Vector, ...]:
+        """All that one tick leaves to the next: integrals of CoM and palms, filtered palm forces."""
+        return *self._tasks.integrals, self._sensed
+
     def forget(self) -> None:
         """See `TaskStack.forget`."""
         self._tasks.forget()

@@ -51,6 +51,11 @@ class TaskStack:
             self._foot(kinematics, setpoint, side)
             self._hand(kinematics, setpoint, side)
 
+    @property
+    def integrals(self) -> tuple[Vector, Vector]:
+        """Of CoM (3,) and palms (2, 3) [m s]."""
+        return self._com_integral, self._hand_integral
+
     def forget(self) -> None:
         """Clear the integrals: after a failed solve their content is not to be trusted (it may not be finite)."""
         self._com_integral[:], self._hand_integral[:] = 0.0, 0.0

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from time import perf_counter
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from wbmpc.qp import make_workspace
 from wbmpc.robot import Robot
-from wbmpc.signals import RobotState, Setpoint, TorqueCommand
+from wbmpc.signals import RobotState, Setpoint, TorqueCommand, Vector
 from wbmpc.tracker.fused import FusedAssembly
-from wbmpc.tracker.plain import PlainAssembly
 from wbmpc.tracker.program import TrackerProgram
 from wbmpc.tracker.reflex import TouchReflex
 from wbmpc.tracker.settings import TrackerSettings
+
+if TYPE_CHECKING:
+    from wbmpc.tracker.plain import PlainAssembly
 
 BINDING = 1e-9  # [N·m] beyond the servo's line
 
@@ -24,6 +26,11 @@ class Assembly(Protocol):
 
     def build(self, state: RobotState, setpoint: Setpoint) -> None: ...
     def forget(self) -> None: ...
+
+    @property
+    def memory(self) -> tuple[Vector, ...]:
+        """All that one tick leaves to the next: integrals of CoM and palms, filtered palm forces."""
+        ...
 
 
 class Tracker:
@@ -46,13 +53,18 @@ class Tracker:
         """`step` is the tick's length [s]."""
         self._robot, self._settings = robot, settings
         self._program = TrackerProgram(robot, settings)
-        assembly = FusedAssembly if settings.assembly == "fused" else PlainAssembly
-        self._assembly: Assembly = assembly(robot, settings, self._program, step=step)
+        self._assembly: Assembly = _assembly(settings)(robot, settings, self._program, step=step)
         self._full = make_workspace(settings.qp_backend, self._program.qp)
         self._relaxed = make_workspace(settings.qp_backend, self._program.relaxed)
         self._bound = False  # torques were at the servo's line in the last tick
         self._reflex = TouchReflex()
         self._torque = np.zeros(robot.nj)
+
+    def continue_from(self, other: Tracker) -> None:
+        """Go on where another one, with other settings, has stopped."""
+        self._bound, self._reflex, self._torque = other._bound, other._reflex, other._torque
+        for mine, before in zip(self._assembly.memory, other._assembly.memory, strict=True):
+            mine[:] = before
 
     def solve(self, state: RobotState, setpoint: Setpoint) -> TorqueCommand:
         """Torques for one tick. Never raises for a failed solve: see the class."""
@@ -92,3 +104,11 @@ class Tracker:
             solve_time=perf_counter() - start,
             fallback=False,
         )
+
+
+def _assembly(settings: TrackerSettings) -> type[FusedAssembly | PlainAssembly]:
+    if settings.assembly == "fused":
+        return FusedAssembly
+    from wbmpc.tracker.plain import PlainAssembly  # with it comes scipy: 25 MB that a run does without
+
+    return PlainAssembly

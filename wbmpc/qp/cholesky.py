@@ -25,12 +25,18 @@ def factor(H, n):  # type: ignore[no-untyped-def]
 
 
 @short_kernel
-def substitute(U, b, n):  # type: ignore[no-untyped-def]
-    """Replace the first n of `b` by the solution x of Uᵀ U x = b."""
+def forward(U, b, n):  # type: ignore[no-untyped-def]
+    """Replace the first n of `b` by the solution x of Uᵀ x = b."""
     for j in range(n):
         b[j] /= U[j, j]
         for k in range(j + 1, n):
             b[k] -= U[j, k] * b[j]
+
+
+@short_kernel
+def substitute(U, b, n):  # type: ignore[no-untyped-def]
+    """Replace the first n of `b` by the solution x of Uᵀ U x = b."""
+    forward(U, b, n)
     for j in range(n - 1, -1, -1):
         rest = b[j]
         for k in range(j + 1, n):

@@ -1,0 +1,152 @@
+"""A QP solved from a guess of its active set, as machine code: right after a round or two, or not at all."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbmpc.jit import kernel
+from wbmpc.qp.cholesky import factor, forward, substitute
+from wbmpc.signals import Vector
+
+MOST_ROUNDS = 6
+TOLERANCE = 1e-9  # relative, of a bound or a multiplier's sign
+DEPENDENT = 1e-10  # squared share of an active row that the others do not already say; below it is too near to them
+
+
+@kernel
+def solve_from_guess(
+    hessian: Vector,
+    gradient: Vector,
+    matrix: Vector,
+    all_lower: Vector,
+    all_upper: Vector,
+    softness: Vector,
+    active: NDArray[np.int8],
+) -> tuple[int, Vector]:
+    """Minimise ½ xᵀ H x + gᵀ x + ½ Σ s_i² / d_i within bounds and rows: rounds (0: not found) and x (n,).
+
+    What `active` (n + m,) says, variables first, holds with equality: 1 at the upper bound, -1 at the lower. Whoever is
+    violated joins, whoever has a multiplier of the wrong sign leaves, all at once, until nobody does: then all
+    conditions of the optimum hold, and H being positive definite it is the only one. That need not come to an end; it
+    is given up after MOST_ROUNDS, and where active rows all but depend on each other. `active` is overwritten: by the
+    optimum's set, or by zeros where none was found.
+
+    Args:
+        all_lower, all_upper: (n + m,) of variables, then rows; they do not cross.
+        softness: (m,) d, 0 for a hard row.
+
+    The variables at their bounds are fixed; with Uᵀ U = H over the others and Y = U⁻ᵀ Aᵀ of the active rows, their
+    multipliers solve (Yᵀ Y + D) λ = Yᵀ z − b, z = −U⁻ᵀ g, and x = U⁻¹ (z − Y λ).
+    """
+    n, m = len(gradient), len(softness)
+    x, nothing = np.empty(n), (0, np.empty(0))
+    U, z, free = np.empty((n, n)), np.empty(n), np.empty(n, np.int64)
+    most = min(m, 2 * n)  # active rows; soft ones may be more than the variables
+    Y, rows = np.empty((most, n)), np.empty(most, np.int64)
+    gram, square, multiplier = np.empty((most, most)), np.empty(most), np.empty(most)
+    for rounds in range(1, MOST_ROUNDS + 1):
+        count = 0
+        for i in range(n):
+            if active[i] == 0:
+                free[count] = i
+                count += 1
+            else:
+                x[i] = all_upper[i] if active[i] > 0 else all_lower[i]
+        for a in range(count):
+            i = free[a]
+            z[a] = -gradient[i]
+            for b in range(a, count):
+                U[a, b] = hessian[i, free[b]]
+            if count < n:
+                for j in range(n):
+                    if active[j] != 0:
+                        z[a] -= hessian[i, j] * x[j]
+        if not factor(U, count):
+            break
+        forward(U, z, count)
+        held = 0
+        for r in range(m):
+            if active[n + r] == 0:
+                continue
+            if held == most:
+                active[:] = 0
+                return nothing
+            bound = all_upper[n + r] if active[n + r] > 0 else all_lower[n + r]
+            for a in range(count):
+                Y[held, a] = matrix[r, free[a]]
+            if count < n:
+                for j in range(n):
+                    if active[j] != 0:
+                        bound -= matrix[r, j] * x[j]
+            forward(U, Y[held], count)
+            rows[held], multiplier[held] = r, -bound
+            held += 1
+        for c in range(held):
+            for a in range(count):
+                multiplier[c] += Y[c, a] * z[a]
+            for d in range(c, held):
+                gram[c, d] = 0.0
+                for a in range(count):
+                    gram[c, d] += Y[c, a] * Y[d, a]
+            gram[c, c] += softness[rows[c]]
+            square[c] = gram[c, c]
+        if not factor(gram, held):
+            break
+        for c in range(held):
+            if gram[c, c] ** 2 < DEPENDENT * square[c]:
+                active[:] = 0
+                return nothing
+        substitute(gram, multiplier, held)
+        for c in range(held):
+            for a in range(count):
+                z[a] -= multiplier[c] * Y[c, a]
+        for a in range(count - 1, -1, -1):
+            rest = z[a]
+            for b in range(a + 1, count):
+                rest -= U[a, b] * z[b]
+            z[a] = rest / U[a, a]
+            x[free[a]] = z[a]
+            if not np.isfinite(z[a]):
+                active[:] = 0
+                return nothing
+        changed = False
+        if count < n:
+            for j in range(n):
+                if active[j] == 0 or all_lower[j] == all_upper[j]:
+                    continue
+                slope, size = gradient[j], abs(gradient[j])
+                for i in range(n):
+                    slope += hessian[j, i] * x[i]
+                for c in range(held):
+                    slope += multiplier[c] * matrix[rows[c], j]
+                if slope * active[j] > TOLERANCE * (1.0 + size):
+                    active[j], changed = 0, True
+        for c in range(held):
+            r = n + rows[c]
+            if multiplier[c] * active[r] < 0.0 and all_lower[r] != all_upper[r]:
+                active[r], changed = 0, True
+        for a in range(count):
+            i = free[a]
+            if x[i] > all_upper[i] + TOLERANCE * (1.0 + abs(all_upper[i])):
+                active[i], changed = 1, True
+            elif x[i] < all_lower[i] - TOLERANCE * (1.0 + abs(all_lower[i])):
+                active[i], changed = -1, True
+        c = 0
+        for r in range(m):
+            if c < held and rows[c] == r:  # what has just left stays out of this round
+                c += 1
+                continue
+            value, low, high = 0.0, all_lower[n + r], all_upper[n + r]
+            if low == -np.inf and high == np.inf:
+                continue
+            for j in range(n):
+                value += matrix[r, j] * x[j]
+            if not value <= high + TOLERANCE * (1.0 + abs(high)):  # nor nan
+                active[n + r], changed = 1, True
+            elif value < low - TOLERANCE * (1.0 + abs(low)):
+                active[n + r], changed = -1, True
+        if not changed:
+            return rounds, x
+    active[:] = 0
+    return nothing
