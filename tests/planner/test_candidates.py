@@ -53,13 +53,15 @@ def test_a_forearm_inside_an_obstacle_is_out_of_reach() -> None:
     refresh(free, SOLES, plans=60)
     left = next(c for c in free.all if c.hand == 0)
     polygon = standing_polygon(0.01)
-    assert free.reach_slack(left, polygon) > 0.0
+    assert free.reach(left, polygon).slack > 0.0
     _, elbow = left.posture.forearm(0)
     assert not np.allclose(elbow, palms(HOME)[0])
     post = Obstacle(centre=elbow, half=np.full(3, 0.01), yaw=0.0, corners=np.zeros((4, 2)), bottom=0.0, top=1.0)
     blocked = candidates(place, obstacles=(post,))
     refresh(blocked, SOLES, plans=60)
-    assert blocked.reach_slack(next(c for c in blocked.all if c.hand == 0), polygon) < 0.0
+    reach = blocked.reach(next(c for c in blocked.all if c.hand == 0), polygon)
+    assert reach.slack < 0.0
+    assert reach.limit == "obstacle"
 
 
 def test_where_nothing_is_nobody_looks_twice_where_a_palm_fell_short_it_may_once_more() -> None:

@@ -261,6 +261,7 @@ def test_margins_of_a_preview_grow() -> None:
 @settings(max_examples=20, deadline=None)
 @given(command=commands, ticks=st.integers(60, 400), x=st.floats(-0.02, 0.02), y=st.floats(-0.02, 0.02))
 @example(command=(0.125, 0.0, 1e-8), ticks=71, x=0.0, y=0.0)  # sides of the hull that are straight but for rounding
+@example(command=(0.087890625, 0.0, 1e-9), ticks=62, x=0.0164, y=0.0)  # corners on either side of a rounding's step
 def test_rows_move_with_the_footsteps(command: Velocity, ticks: int, x: float, y: float) -> None:
     """If the present swing lands (x, y) off and the later steps follow, the moved rows are the feet's own.
 
@@ -307,7 +308,7 @@ def test_a_transfer_moves_exactly_with_its_footsteps(seed: int, share: float, ya
     by = shares[:2] @ displaced[::-1]  # footstep 0 is the right foot's, 1 the left foot's
     for angle in 2 * np.pi * np.arange(16) / 16:
         u = np.array([np.cos(angle), np.sin(angle)])
-        assert reach(here, u) + by @ u == pytest.approx(reach(there, u), abs=1e-9)  # the hull drops corners so flat
+        assert reach(here, u) + by @ u == pytest.approx(reach(there, u), abs=1e-6)  # the hull drops corners so flat
     for time, side in ((0.2, 0), (0.35, 1)):
         end = Interval(0.35, feet, -1, (1, 0), transfer).polygon(time, half_extents=HALF, margin=0.0)
         foot = SupportPolygon.of_corners(sole(feet, side), margin=0.0, plane_height=0.0)

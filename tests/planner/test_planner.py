@@ -61,18 +61,34 @@ def test_the_task_waits_for_an_expected_contact() -> None:
     assert reports[loaded + 60].progress == pytest.approx(1.0)
 
 
+def test_a_firing_says_what_it_was_asked() -> None:
+    """The reach ends 5 cm beyond the toes, later than the horizon: its knot has no time, and the larger ΔZ."""
+    report = far_reach().fired[0]
+    firing = report.firing
+    assert firing is not None
+    assert report.time < firing.knot_times[0] <= report.time + 1.6
+    assert firing.knot_times[1] == np.inf
+    assert np.abs(firing.delta_z[0]).max() == pytest.approx(np.abs(report.delta_z).max())
+    assert np.abs(firing.delta_z[0]).max() > 0.002
+    assert np.abs(firing.delta_z[1]).max() > np.abs(firing.delta_z[0]).max()
+    fits = report.support_polygon[:, 0].max()
+    assert firing.zmp[1, 0] + firing.delta_z[1, 0] < fits < firing.zmp[1, 0]
+    assert firing.held == ()
+    assert any("mm at the task's end, chose table_right_1" in event for event in report.events)
+
+
 def test_every_report_of_a_candidate_says_why_it_lost() -> None:
     by_name = {(c.patch, c.hand): c for c in far_reach().fired[0].candidates}
     assert len(by_name) == 2 * len(resolve_patches(REACH))
     assert by_name["table_far", 1].reason.startswith("unreachable by")
-    assert by_name["wall_1", 1].reason == "no force in its cone gives the shift"  # it would push to the left
-    assert all(c.reason == "hand is in use" for (_, hand), c in by_name.items() if hand == 0)
+    assert by_name["wall_1", 1].reason == "would slip: needs a friction above 0.4"  # it pushes to the left
+    assert all(c.reason == "hand is the task's" for (_, hand), c in by_name.items() if hand == 0)
     winner = by_name["table_right_1", 1]
     assert winner.cost == min(c.cost for c in by_name.values())
     for candidate in by_name.values():
         assert np.isfinite(candidate.cost) == (candidate.reason in ("chosen",) or "above the best" in candidate.reason)
         if not np.isfinite(candidate.cost):
-            assert not candidate.force.any()
+            assert not candidate.forces.any()
 
 
 def test_plans_with_a_contact_balance_under_newton_euler() -> None:

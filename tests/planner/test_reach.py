@@ -39,7 +39,7 @@ class Bench:
             values.append(value)
 
     def preview(self, seconds: Vector, *, rate: float) -> Vector:
-        return self.reach.preview(self.reach.progress.sigmas(self.time, seconds, rate=rate))
+        return self.reach.preview(self.reach.progress.sigmas(self.time, seconds, rate=rate), seconds)
 
     def run_to(self, phase: TaskPhase, seconds: float = 12.0) -> float:
         begin = self.time

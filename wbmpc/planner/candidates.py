@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbmpc.planner.candidate_reports import FALLS_SHORT, NO_COST, Reach, Weighed, friction_margin, weigh
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contact_stage import make_contact_choice
@@ -32,7 +33,7 @@ class Candidate:
     patch: PatchPose
     hand: int
     posture: Posture
-    excluded: bool = False  # it was chosen before, and is not to be again
+    excluded: str = ""  # why it is not to be chosen, "" when it may be
     tries: int = 0  # how often the palm did not get there
     current: bool = False  # its posture has been iterated for the feet as they stand
 
@@ -47,7 +48,8 @@ class Candidate:
         From elsewhere a palm may find a way to the patch; where there is nothing it will find nothing.
         """
         self.tries += 1
-        self.excluded = outcome == "missing" or self.tries >= MOST_TRIES
+        if outcome == "missing" or self.tries >= MOST_TRIES:
+            self.excluded = "tried before, in vain"
 
     def goal(self, palm_radius: float) -> PalmTarget:
         """The palm when it rests on the patch."""
@@ -77,7 +79,7 @@ class Candidates:
             for patch in patches
             for hand in range(len(SIDES))
         ]
-        self._places = {(id(c.patch), c.hand): c for c in self.all}
+        self._places = {(c.patch.name, c.hand): c for c in self.all}
         self._turn = -1
         self._stand: tuple[bytes, ...] = ()  # where the feet were at the last refresh
         self._left = np.array([0.0, 1.0])  # unit, to the robot's left
@@ -115,7 +117,14 @@ class Candidates:
 
     def of(self, patch: PatchPose | None, hand: int) -> Candidate:
         """The candidate of a hand on a patch."""
-        return self._places[id(patch), hand]
+        assert patch is not None
+        return self._places[patch.name, hand]
+
+    def forbid(self, patch: str) -> None:
+        """Never choose the patch of this name from now on; a hand that is on its way there, or there, is left alone."""
+        for candidate in self.all:
+            if candidate.patch.name == patch:
+                candidate.excluded = "forbidden"
 
     @property
     def settled(self) -> bool:
@@ -130,20 +139,24 @@ class Candidates:
                 break
         return self.all[self._turn]
 
-    def reach_slack(self, candidate: Candidate, polygon: SupportPolygon) -> float:
-        """Reach margin [m]: negative when the palm falls short, the forearm meets something or the CoM strays."""
-        palm = self._settings.reach_margin - candidate.posture.residual
-        elbow = ELBOW_TOLERANCE - candidate.posture.elbow_excess
-        gap = self._keep_out.forearm_gap(*candidate.posture.forearm(candidate.hand))
-        com = COM_TOLERANCE - polygon.excess(candidate.posture.com)
-        return min(palm, elbow, gap, com)
+    def reach(self, candidate: Candidate, polygon: SupportPolygon) -> Reach:
+        """Reach margin: used up when the palm falls short, the forearm meets something or the CoM strays."""
+        posture = candidate.posture
+        margins = {
+            "palm": self._settings.reach_margin - posture.residual,
+            "elbow": ELBOW_TOLERANCE - posture.elbow_excess,
+            "obstacle": self._keep_out.forearm_gap(*posture.forearm(candidate.hand)),
+            "CoM": COM_TOLERANCE - polygon.excess(posture.com),
+        }
+        limit = min(margins, key=lambda name: margins[name])
+        return Reach(float(margins[limit]), limit)
 
     def choose(
         self,
         need: Need,
         *,
         palms: Vector,
-        free_hands: list[bool],
+        engaged: list[str],
         held: list[Option],
         polygon: SupportPolygon,
         urgency: float,
@@ -152,7 +165,7 @@ class Candidates:
 
         Args:
             palms: (2, 3) where the palms are [m]: closer patches are cheaper.
-            free_hands: which hands may take a contact.
+            engaged: why a hand can take no contact, "" for one that may.
             held: contacts taken before, which keep their share of the load.
             polygon: where the CoM may be before a new contact carries load.
             urgency: 0 … 1, the alarm: a hand that would come too late is out of the question.
@@ -162,8 +175,8 @@ class Candidates:
         """
         if self._choice is None:
             return [], (), StageReport(SolveStatus.INFEASIBLE, 0.0, 0)
-        slacks = {id(c): self.reach_slack(c, polygon) for c in self.all}
-        distances, reasons = self._sort_out(slacks, palms=palms, free_hands=free_hands, held=held, urgency=urgency)
+        reaches = {id(c): self.reach(c, polygon) for c in self.all}
+        distances, reasons = self._sort_out(reaches, palms=palms, engaged=engaged, held=held, urgency=urgency)
         considered = [c for c in self.all if id(c) not in reasons]
         considered.sort(key=lambda candidate: distances[id(candidate)])
         room = self._slots - len(held)
@@ -180,20 +193,24 @@ class Candidates:
         weighed = self._weigh(need, considered, options, winners=winners, held=held)
         reports = []
         for candidate in self.all:
-            cost, forces, reason = np.inf, np.zeros((1, 3)), reasons.get(id(candidate), "")
-            if id(candidate) in weighed:
-                cost, forces, company = weighed[id(candidate)]
-                reason = _reason(candidate, cost, best=best, winners=winners, company=company)
+            key, patch = id(candidate), candidate.patch
+            seen = weighed.get(key, Weighed(np.inf, NO_COST, np.zeros((len(need.zmp), 3)), (), ""))
             reports.append(
                 CandidateReport(
-                    patch=candidate.patch.name,
+                    patch=patch.name,
                     hand=candidate.hand,
                     chosen=any(w is candidate for w in winners),
-                    cost=cost,
-                    reach_slack=slacks[id(candidate)],
-                    friction_margin=_friction_margin(candidate.patch, forces) if np.isfinite(cost) else float("nan"),
-                    force=forces[0],
-                    reason=reason,
+                    cost=seen.cost,
+                    way_cost=seen.parts.way,
+                    force_cost=seen.parts.force,
+                    shift_cost=seen.parts.shift,
+                    beside=tuple(option.patch.name for option in seen.beside),
+                    palm=candidate.goal(self._robot.palm_radius).position,
+                    reach_slack=reaches[key].slack,
+                    reach_limit=reaches[key].limit,
+                    friction_margin=friction_margin(patch, seen.forces) if np.isfinite(seen.cost) else float("nan"),
+                    forces=seen.forces,
+                    reason=reasons.get(key) or _reason(candidate, seen, best=best, winners=winners),
                 )
             )
         return winners, tuple(reports), stage
@@ -206,10 +223,10 @@ class Candidates:
 
     def _sort_out(
         self,
-        slacks: dict[int, float],
+        reaches: dict[int, Reach],
         *,
         palms: Vector,
-        free_hands: list[bool],
+        engaged: list[str],
         held: list[Option],
         urgency: float,
     ) -> tuple[dict[int, float], dict[int, str]]:
@@ -217,19 +234,19 @@ class Candidates:
         distances: dict[int, float] = {}
         reasons: dict[int, str] = {}
         for candidate in self.all:
-            key, slack = id(candidate), slacks[id(candidate)]
+            key, reach = id(candidate), reaches[id(candidate)]
             goal = candidate.goal(self._robot.palm_radius).position
             distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
             if any(option.patch is candidate.patch and option.hand == candidate.hand for option in held):
                 reasons[key] = "held already"
             elif any(option.patch is candidate.patch for option in held):
                 reasons[key] = "patch is in use"
-            elif not free_hands[candidate.hand]:
-                reasons[key] = "hand is in use"
+            elif engaged[candidate.hand]:
+                reasons[key] = engaged[candidate.hand]
             elif candidate.excluded:
-                reasons[key] = "tried before, in vain"
-            elif slack < 0.0:
-                reasons[key] = f"unreachable by {-100.0 * slack:.1f} cm"
+                reasons[key] = candidate.excluded
+            elif reach.slack < 0.0:
+                reasons[key] = f"unreachable by {-100.0 * reach.slack:.1f} cm: {FALLS_SHORT[reach.limit]}"
             elif (
                 hurried(urgency)
                 and (late := way_time(self._settings, distances[key]) - self._settings.urgent_time) > 0.0
@@ -245,11 +262,11 @@ class Candidates:
         *,
         winners: list[Candidate],
         held: list[Option],
-    ) -> dict[int, tuple[float, Vector, bool]]:
-        """Each candidate's cost, prices included, and forces (knots, 3) [N] beside those it would have as company.
+    ) -> dict[int, Weighed]:
+        """Each candidate beside those it would have as company, by its id.
 
-        By id of the candidate; and whether it has company at all: what is held, and the other hand's winner, unless the
-        candidate could take the single winner's place, whichever hand that has.
+        Company is what is held, and the other hand's winner, unless the candidate could take the single winner's place,
+        whichever hand that has.
         """
         if self._choice is None or not considered:
             return {}
@@ -259,26 +276,19 @@ class Candidates:
         for candidate in considered:
             beside = [place[id(w)] for w in winners if full and w is not candidate and w.hand != candidate.hand]
             sets.append((place[id(candidate)], *range(len(held)), *beside))
-        answers = self._choice.costs(need, [*held, *options], sets, left=self._left)
-        return {
-            id(candidate): (cost, forces[0], len(members) > 1)
-            for candidate, (cost, forces), members in zip(considered, answers, sets, strict=True)
-        }
+        answers = weigh(
+            *(self._choice, need, [*held, *options], sets),
+            left=self._left,
+            settings=self._settings,
+            mass=self._robot.mass,
+        )
+        return {id(candidate): answer for candidate, answer in zip(considered, answers, strict=True)}
 
 
-def _reason(candidate: Candidate, cost: float, *, best: float, winners: list[Candidate], company: bool) -> str:
+def _reason(candidate: Candidate, seen: Weighed, *, best: float, winners: list[Candidate]) -> str:
     """Why a candidate that stage 3 weighed won or lost."""
     if any(winner is candidate for winner in winners):
         return "chosen" if len(winners) == 1 else "chosen, with another"
     if any(winner.patch is candidate.patch for winner in winners):
         return "patch is taken by the other hand"
-    if np.isfinite(cost):
-        return f"cost {cost - best:.3g} above the best"
-    return "does not do beside the others" if company else "no force in its cone gives the shift"
-
-
-def _friction_margin(patch: PatchPose, forces: Vector) -> float:
-    """Smallest μ f_n − |f_t| [N] of forces (n, 3) in world."""
-    normal = forces @ patch.normal
-    tangential = np.linalg.norm(forces - normal[:, None] * patch.normal, axis=1)
-    return float(np.min(patch.friction * normal - tangential))
+    return seen.hindrance or f"cost {seen.cost - best:.3g} above the best"

@@ -10,6 +10,7 @@ from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contact_stage import make_force_stage
+from wbmpc.planner.firing import Asked, fire, worst_knots
 from wbmpc.planner.hand_contact import HandContact
 from wbmpc.planner.keep_out import KeepOut
 from wbmpc.planner.pace import hurried
@@ -18,12 +19,11 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
 from wbmpc.scenario import PatchPose
-from wbmpc.signals import SIDES, CandidateReport, ContactPhase, SolveStatus, StageReport, Vector
+from wbmpc.signals import SIDES, ContactPhase, Firing, SolveStatus, StageReport, Vector
 
 RETRY_PLANS = 10  # plans between two looks at whether the contacts there are do, and two firings of stage 3
 TOGETHER_COST = 15.0  # [cost / m²] how hard the posture with both hands on their patches keeps its CoM over the feet
 SETTLE_TIME = 1.0  # [s] given to the candidates' postures, when the feet have moved, before one is chosen
-RESERVE = 0.012  # [m] of the feet's pressure inside its polygon that a contact should leave, if any does
 GIVE_UP_TIME = 2.0  # [s] without a helpful candidate after which the task goes on without a contact
 CARRYING = (ContactPhase.LOADED, ContactPhase.QUIET)
 NOT_RUN = StageReport(SolveStatus.NOT_RUN, 0.0, 0)
@@ -166,6 +166,7 @@ class Contacts:
 
     def plan(
         self,
+        time: float,
         need: Need,
         *,
         goal: Need | None,
@@ -175,10 +176,11 @@ class Contacts:
         polygon: SupportPolygon,
         spent: tuple[int, ...],
         events: list[str],
-    ) -> tuple[tuple[CandidateReport, ...], StageReport]:
+    ) -> tuple[Firing | None, StageReport]:
         """Judge the need, choose contacts when those there are do not do, and plan the forces of those that touch.
 
         Args:
+            time: now [s].
             goal: the need, of one knot, where the running task ends, maybe beyond the horizon; None without a task.
             binding: whether there is no way back before that end (a foot in the air): it is waited for from the start.
             palms: (2, 3) measured [m].
@@ -187,7 +189,7 @@ class Contacts:
             spent: sides of contacts that the task's end leaves out of reach: they make room for others.
 
         Returns:
-            A report on every candidate when stage 3 fired (else empty), and stage 3's own report.
+            What stage 3 was asked and made of it when it fired (else None), and stage 3's own report.
         """
         self._spent = spent
         shift = float(np.abs(need.delta_z).max())
@@ -196,19 +198,25 @@ class Contacts:
         self._needed = shift > self._settings.need_threshold
         self._quiet = shift < self._settings.quiet_threshold
         self._since_review += 1
-        reports: tuple[CandidateReport, ...] = ()
+        firing: Firing | None = None
         stage = NOT_RUN
-        free = [not c.busy and not taken for c, taken in zip(self.hands, hand_taken, strict=True)]
+        engaged = [
+            "hand has a contact" if c.busy else "hand is the task's" if taken else ""
+            for c, taken in zip(self.hands, hand_taken, strict=True)
+        ]
+        free = [not why for why in engaged]
         if not self._needed:
             self._hopeless, self._waited, self._spare, self._short = 0.0, 0.0, None, False
         elif self.candidates.all:
             self._waited = 0.0 if self.candidates.settled else self._waited + self._period
             if self._known and self._since_review >= RETRY_PLANS and (any(free) or len(self._committed) > 1):
                 self._since_review = 0
-                knots = self._worst_knots(need, goal)
-                self._review(knots)
+                asked = worst_knots(need, goal, times=self._times, threshold=self._settings.need_threshold)
+                self._review(asked.need)
                 if self._short and any(free) and self._hopeless < GIVE_UP_TIME:
-                    reports, stage = self._fire(knots, palms=palms, free=free, polygon=polygon, events=events)
+                    firing, stage = self._fire(
+                        time, asked, palms=palms, engaged=engaged, polygon=polygon, events=events
+                    )
             returning = any(c.phase == ContactPhase.RELEASED for c in self.hands)  # a hand that is back may be of help
             if (not self._committed or self._short) and not returning:
                 self._hopeless += self._period
@@ -217,24 +225,13 @@ class Contacts:
         for contact in self.hands:
             contact.need(self._short and free[contact.side] and self._hopeless < GIVE_UP_TIME)
         force_stage = self._plan_forces(need)
-        return reports, force_stage if stage is NOT_RUN else stage
+        return firing, force_stage if stage is NOT_RUN else stage
 
     @property
     def _committed(self) -> list[HandContact]:
         """The contacts that are there or on their way, those that are being released left out."""
         leaving = (ContactPhase.UNLOADED, ContactPhase.RELEASED)
         return [c for c in self.hands if c.busy and c.phase not in leaving and c.side not in self._spent]
-
-    def _worst_knots(self, need: Need, goal: Need | None) -> Need:
-        """Two knots to choose for: the largest shift in the horizon, and the task's end or the largest sideways.
-
-        At the first sign of need the horizon shows a few millimetres; the contact must also do for where this leads.
-        """
-        sizes = np.abs(need.delta_z)
-        worst = int(np.argmax(sizes.max(axis=1)))
-        if goal is not None and np.abs(goal.delta_z).max() > self._settings.need_threshold:
-            return need.pick([worst]).followed_by(goal)
-        return need.pick([worst, int(np.argmax(sizes[:, 1]))])
 
     def _review(self, knots: Need) -> None:
         """Whether the committed contacts fall short of the need, and which of two the other can do without.
@@ -255,28 +252,32 @@ class Contacts:
                 self._spare = before if before in spare else min(spare, key=lambda side: alone[1 - side])
 
     def _fire(
-        self, knots: Need, *, palms: Vector, free: list[bool], polygon: SupportPolygon, events: list[str]
-    ) -> tuple[tuple[CandidateReport, ...], StageReport]:
-        """Stage 3's choice of what joins the committed contacts."""
-        held = _options(self._committed)
-        for asked in (knots.inset(RESERVE), knots):
-            winners, reports, stage = self.candidates.choose(
-                asked, palms=palms, free_hands=free, held=held, polygon=polygon, urgency=self._urgency
-            )
-            if winners:
-                break
-        chosen = " and ".join(f"{w.patch.name} for the {SIDES[w.hand]} hand" for w in winners)
-        size = 1e3 * np.abs(knots.delta_z[0]).max()
-        beside = f" beside {' and '.join(option.patch.name for option in held)}" if held else ""
-        events.append(
-            f"stage 3 fired: |ΔZ| {size:.1f} mm{beside}, {f'chose {chosen}' if chosen else 'no candidate helps'}"
+        self,
+        time: float,
+        asked: Asked,
+        *,
+        palms: Vector,
+        engaged: list[str],
+        polygon: SupportPolygon,
+        events: list[str],
+    ) -> tuple[Firing, StageReport]:
+        """Stage 3's choice of what joins the committed contacts, and these chosen."""
+        winners, firing, stage = fire(
+            *(self.candidates, asked),
+            time=time,
+            palms=palms,
+            engaged=engaged,
+            held=_options(self._committed),
+            polygon=polygon,
+            urgency=self._urgency,
+            events=events,
         )
         for winner in winners:
             self.hands[winner.hand].choose(
                 winner.patch, palm=palms[winner.hand], palm_velocity=self._palm_velocities[winner.hand]
             )
             self._hopeless, self._short = 0.0, False
-        return reports, stage
+        return firing, stage
 
     def _plan_forces(self, need: Need) -> StageReport:
         """Forces at every knot for the contacts that touch; a failed solve keeps the last ones."""

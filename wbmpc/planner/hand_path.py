@@ -54,6 +54,18 @@ class HandPath:
             ddp += dds * scale**2 * part
         return p, dp, ddp
 
+    def shared(self, sigma: float, motion: Vector) -> tuple[Vector, Vector]:
+        """What the palm at σ makes of a motion (3,) of the path's end, and the derivative of that with respect to σ."""
+        outward = float(motion @ self.away) * self.away
+        first, second = (LEAD, LAG) if float((self.end - self.start) @ self.away) >= 0.0 else (LAG, LEAD)
+        value, slope = np.zeros(3), np.zeros(3)
+        for part, (begin, finish) in ((outward, first), (motion - outward, second)):
+            scale = 1.0 / (finish - begin)
+            s, ds, _ = minimum_jerk((sigma - begin) * scale)
+            value += s * part
+            slope += ds * scale * part
+        return value, slope
+
     def positions(self, sigmas: Vector) -> Vector:
         """Positions (n, 3) [m] at `sigmas` (n,)."""
         return _positions(self.start, self.end, self.away, sigmas)

@@ -71,6 +71,10 @@ class JointVelocities:
         self._held = np.zeros(velocities, dtype=np.int64)  # at the last optimum: 1 at its upper bound, -1 at its lower
         self._base_gradient = np.zeros(velocities)
         self.cost: VelocityCost | None = None  # as last solved for these tasks
+        nothing, matrix = np.zeros(velocities), np.eye(velocities)
+        _cost(
+            nothing, np.zeros(2), np.zeros((3, velocities)), matrix, nothing, nothing, 0.0
+        )  # compiled now: rarely used
 
     def take(self, tasks: VelocityTasks) -> None:
         """Turn to `tasks`; the same object again changes nothing."""

@@ -17,7 +17,7 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
 from wbmpc.planner.zmp_model import need_at_rest, need_of
-from wbmpc.signals import CandidateReport, StageReport, Vector
+from wbmpc.signals import Firing, StageReport, Vector
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +25,7 @@ class Judgement:
     """What stages 2 and 3 say to the need for a contact."""
 
     delta_z: Vector  # (N, 2) [m] the shift asked for; 0 when nobody was asked
-    candidates: tuple[CandidateReport, ...] = ()
+    firing: Firing | None = None
     stage3: StageReport = NOT_RUN
 
 
@@ -77,8 +77,8 @@ class Judge:
             mass=mass,
             exact=self._settings.formulation == "exact",
         )
-        candidates, stage3 = contacts.plan(
-            need,
+        firing, stage3 = contacts.plan(
+            *(time, need),
             goal=self._goal_need(mass),
             binding=gait.stride is not None,
             palms=palms,
@@ -87,7 +87,7 @@ class Judge:
             spent=references.spent(contacts),
             events=events,
         )
-        return Judgement(wish.delta_z, candidates, stage3)
+        return Judgement(wish.delta_z, firing, stage3)
 
     def _goal_need(self, mass: float) -> Need | None:
         """The need where the current task ends, on the feet that will carry it; None without such a task."""

@@ -67,7 +67,7 @@ class Planner:
     ) -> None:
         """Start from rest at configuration `q` (nq,); `period` is the time between two plans [s]."""
         self._robot, self._settings, self._period = robot, settings, period
-        self._keep_out = KeepOut(obstacles, forearm_radius=robot.forearm_radius, leg_radius=robot.leg_radius)
+        keep_out = self._keep_out = KeepOut(obstacles, forearm_radius=robot.forearm_radius, leg_radius=robot.leg_radius)
         self._preview = Preview(steps=settings.horizon_steps, step=settings.horizon_step)
         self._height_stage = ComHeightStage(self._preview, settings.height, backend=settings.qp_backend)
         joints = JointVelocities(robot.nv, settings.whole_body, backend=settings.qp_backend)
@@ -82,10 +82,9 @@ class Planner:
         self._gate, self._footstep_shift = 1.0, np.zeros((MAX_FOOTSTEPS, 2))
         self._com = ComState(settings, com=measured.com, period=period)
         times = self._preview.times
-        self._contacts = Contacts(
-            robot, settings, patches, keep_out=self._keep_out, nominal=q, times=times, period=period
-        )
+        self._contacts = Contacts(robot, settings, patches, keep_out=keep_out, nominal=q, times=times, period=period)
         self._tasks = Tasks(robot, tasks, loads, palms=measured.palms, heading=float(measured.sole_yaws.mean()))
+        self.order = self._tasks.order  # takes a TargetMove, for the next plan
         self._references = References(robot, self._tasks, q=q, height=float(measured.com[2]), times=times)
         self._judge = Judge(
             settings, gait=self._gait, references=self._references, contacts=self._contacts, tasks=self._tasks
@@ -103,8 +102,7 @@ class Planner:
         self._observe(state)
         self._advance(state, events)
         judged, gated_support = self._supports(state.time)
-        polygon = gated_support.polygons[0]
-        plane = polygon.plane_height
+        plane = gated_support.polygons[0].plane_height
         mass = state.mass_scale * self._robot.mass
 
         gated, sigma = references.palms(state.time, contacts)
@@ -168,10 +166,12 @@ class Planner:
         failed = np.full((preview.steps, 3), np.nan)
         report = PlanReport(
             time=state.time,
+            mass=mass,
             com=np.column_stack([motion.com, height.height]) if motion else failed,
+            com_acceleration=np.column_stack([motion.acceleration, height.acceleration]) if motion else failed,
             com_height_band=band,
             zmp=motion.zmp if motion else failed[:, :2],
-            support_polygon=polygon.vertices,
+            support_polygon=gated_support.polygons[0].vertices,
             delta_z=judgement.delta_z,
             hand_reference=gated,
             contact_force=forces,
@@ -181,13 +181,14 @@ class Planner:
             stage1=stage1,
             stage2=stage2,
             stage3=judgement.stage3,
-            candidates=judgement.candidates,
+            firing=judgement.firing,
             plan_time=perf_counter() - start,
             events=tuple(events),
         )
         if motion is None and self._last is not None:
             self._last = replace(self._last, report=report)
             return self._last
+        modes = [mode for _, _, mode in hands]
         self._last = assemble(
             report,
             step=preview.step,
@@ -197,12 +198,10 @@ class Planner:
             joints=self._joints,
             stance=self._gait.stance,
             soles=soles,
-            modes=[mode for _, _, mode in hands],
+            modes=modes,
             contacts=contacts.hands,
             lift=self._tasks.lifting,
-            arm_keep_out=self._keep_out.of_arms(
-                *self._measured.limbs, free=[mode == HandMode.FREE for _, _, mode in hands]
-            ),
+            arm_keep_out=self._keep_out.of_arms(*self._measured.limbs, free=[m == HandMode.FREE for m in modes]),
         )
         return self._last
 

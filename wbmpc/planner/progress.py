@@ -52,7 +52,8 @@ class Progress:
     def advance(self, time: float, dt: float, *, gate_open: bool, met: bool) -> None:
         """One plan later; the gate is closed while an expected contact is missing; `met`: the target is met now."""
         task, before = self._task, self.rate
-        self.rate = float(np.clip(self.rate + (dt if gate_open else -dt) / GATE_TIME, 0.0, 1.0))
+        lowest = min(self.rate, 0.0)  # below 0 only on a way back that was called off
+        self.rate = float(np.clip(self.rate + (dt if gate_open or lowest else -dt) / GATE_TIME, lowest, 1.0))
         if self.phase == TaskPhase.WAIT and time >= task.start - 1e-9:
             self.phase = TaskPhase.GO
         if self.phase == TaskPhase.GO:
@@ -70,6 +71,13 @@ class Progress:
             if self.sigma <= 0.0:
                 self.phase = TaskPhase.DONE
 
+    def again(self) -> None:
+        """The target has moved: the hold begins anew, a way back is called off and turns around smoothly."""
+        self._held = self._waited = 0.0
+        if self.phase in (TaskPhase.BACK, TaskPhase.DONE):
+            self.rate = -self._go_time / self._task.withdraw if self.phase == TaskPhase.BACK else 0.0
+            self.phase = TaskPhase.GO
+
     def sigmas(self, time: float, times: Vector, *, rate: float) -> Vector:
         """σ (n,) at `times` (n,) seconds from now, the way out going on at `rate`."""
         if self.phase == TaskPhase.BACK:
@@ -77,7 +85,7 @@ class Progress:
         if self.phase == TaskPhase.DONE:
             return np.zeros(len(times))
         moving = times if self.phase != TaskPhase.WAIT else np.maximum(times - (self._task.start - time), 0.0)
-        return np.clip(self.sigma + rate * moving / self._go_time, 0.0, 1.0)
+        return np.clip(self.sigma + max(rate, 0.0) * moving / self._go_time, 0.0, 1.0)
 
     def _move(self, rate: float, acceleration: float, dt: float) -> None:
         self.sigma = float(np.clip(self.sigma + rate * dt, 0.0, 1.0))

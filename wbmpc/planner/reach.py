@@ -1,11 +1,14 @@
-"""A reach: a palm goes to a target, stays and comes back."""
+"""A reach: a palm goes to a target, which may be moved meanwhile, stays and comes back."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 
 from wbmpc.planner.hand_path import HandPath
-from wbmpc.planner.progress import Progress
+from wbmpc.planner.moving_target import MovingTarget
+from wbmpc.planner.progress import Progress, TaskPhase
 from wbmpc.scenario import ReachTask
 from wbmpc.signals import Vector
 
@@ -16,21 +19,56 @@ class Reach:
     def __init__(self, task: ReachTask, *, side: int, palm: Vector) -> None:
         """`palm` (3,) is where the hand starts [m]."""
         self.task, self.side = task, side
-        self.target = np.array(task.target)
+        self._place = MovingTarget(np.array(task.target))
         self.progress = Progress(task)
         self._path = HandPath(start=palm.copy(), end=self.target, away=np.array([0.0, 0.0, 1.0]))
 
+    @property
+    def target(self) -> Vector:
+        """Where the palm shall be (3,) [m]: the task's target, or on the way to where that was moved."""
+        return self._place.position
+
+    def move(self, target: Vector, *, palm: Vector) -> None:
+        """The target is at `target` (3,) [m] from now on, the palm now at `palm` (3,).
+
+        A reach that waits simply has another target. One on its way, or at its target, goes on to the new place, its
+        hold begins anew; one that comes back, or is done, sets out again.
+        """
+        if self.progress.phase == TaskPhase.DONE:
+            self._path = replace(self._path, start=palm.copy())
+        if self.progress.sigma <= 0.0:
+            self._place = MovingTarget(target.copy())
+            self._path = replace(self._path, end=self.target)
+        else:
+            self._place.goal = target.copy()
+        self.progress.again()
+
     def advance(self, time: float, dt: float, *, gate_open: bool, palm: Vector) -> None:
         """One plan later: `palm` (3,) is measured [m]; the gate is closed while an expected contact is missing."""
-        met = float(np.linalg.norm(palm - self.target)) < self.task.tolerance
+        met = float(np.linalg.norm(palm - self._place.goal)) < self.task.tolerance
         self.progress.advance(time, dt, gate_open=gate_open, met=met)
+        if self._place.moving:
+            self._place.advance(dt * max(self.progress.rate, 0.0))
+            self._path = replace(self._path, end=self.target)
 
     def reference(self) -> tuple[Vector, Vector, Vector]:
         """Palm position, velocity and acceleration (3,) to follow now."""
-        progress = self.progress
+        progress, place = self.progress, self._place
         p, dp, ddp = self._path.at(progress.sigma)
-        return p, dp * progress.sigma_rate, ddp * progress.sigma_rate**2 + dp * progress.sigma_acceleration
+        v = dp * progress.sigma_rate
+        a = ddp * progress.sigma_rate**2 + dp * progress.sigma_acceleration
+        if place.moving:
+            rate = max(progress.rate, 0.0)  # of this reach's clock, which the target's way waits for
+            shared, slope = self._path.shared(progress.sigma, place.velocity * rate)
+            v = v + shared
+            a = a + 2.0 * slope * progress.sigma_rate
+            a = a + self._path.shared(progress.sigma, place.acceleration * rate**2)[0]
+        return p, v, a
 
-    def preview(self, sigmas: Vector) -> Vector:
-        """Palm references (n, 3) [m] at the places `sigmas` (n,) of the way."""
-        return self._path.positions(sigmas)
+    def preview(self, sigmas: Vector, times: Vector) -> Vector:
+        """Palm references (n, 3) [m] at the places `sigmas` (n,) of the way, `times` (n,) seconds from now."""
+        if not self._place.moving:
+            return self._path.positions(sigmas)
+        ends = self._place.preview(times)
+        paths = [replace(self._path, end=end).positions(sigmas[k : k + 1]) for k, end in enumerate(ends)]
+        return np.concatenate(paths)

@@ -101,7 +101,7 @@ class References:
             sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
             sigma = np.maximum(sigma, sigmas)
             if isinstance(task, Reach):
-                references[task.side] = task.preview(sigmas)
+                references[task.side] = task.preview(sigmas, times)
         if self._tasks.lifting is not None:
             references[:] = self._tasks.lifting.preview(times)
             sigma = np.maximum(sigma, self._tasks.lifting.sigmas(times))

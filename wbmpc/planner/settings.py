@@ -31,10 +31,10 @@ class HeightSettings(StrictModel):
 class WholeBodySettings(StrictModel):
     """Stage 2: horizontal CoM, ΔZ and joint velocities."""
 
-    jerk_cost: float = Field(1e-4, gt=0, description="[cost / (m/s³)²] α₁ of the paper")
+    jerk_cost: float = Field(1e-4, gt=0, description="[cost / (m/s³)²] α₁ of the paper, on the CoM's jerk")
     delta_z_cost: float = Field(0.2, gt=0, description="[cost / m²] α₂, on the square of ΔZ")
     delta_z_price: float = Field(2.0, ge=0, description="[cost / m] on |ΔZ|: help that is worth less is not asked for")
-    joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃")
+    joint_velocity_cost: float = Field(1e-3, gt=0, description="[cost / (rad/s)²] α₃, on joint velocities")
     upper_body_share: float = Field(
         30.0, gt=0, description="factor on α₃ of the joints that move no foot, but for an arm that has a task"
     )
@@ -84,14 +84,14 @@ class GaitSettings(StrictModel):
     turning_room: float = Field(
         0.07, ge=0, description="[m] by which that width grows with the sine of the angle between the soles"
     )
-    narrowest: float = Field(0.08, gt=0, description="[m] smallest such width")
-    widest: float = Field(0.20, gt=0, description="[m] largest such width")
+    narrowest: float = Field(0.08, gt=0, description="[m] smallest width between the soles' centres")
+    widest: float = Field(0.20, gt=0, description="[m] largest width between the soles' centres")
     longest: float = Field(0.14, gt=0, description="[m] largest distance of a foot ahead of or behind the other")
     foot_speed: float = Field(0.8, gt=0, description="[m/s] how fast a swing foot's landing place may be moved")
     adapt_footsteps: bool = Field(True, description="false fixes the footsteps where the task puts them")
     landing_force: float = Field(4.0, gt=0, description="[N] normal force that counts as landed")
     search_depth: float = Field(0.02, ge=0, description="[m] how far below the ground a late foot is lowered")
-    search_speed: float = Field(0.06, gt=0, description="[m/s] how fast")
+    search_speed: float = Field(0.06, gt=0, description="[m/s] how fast a late foot is lowered")
 
 
 class ContactSettings(StrictModel):
@@ -136,9 +136,13 @@ class PlannerSettings(StrictModel):
         description="stage 3: enumeration with one small QP a knot, or its plain (MI)QPs, the choice on daqp or highs",
     )
     feedback: float = Field(0.02, ge=0, le=1, description="share of the measured CoM error taken over at every plan")
-    feedback_large: float = Field(0.5, ge=0, le=1, description="the same for errors above 2 feedback_knee")
+    feedback_large: float = Field(
+        0.5, ge=0, le=1, description="share of the measured CoM error taken over where it is above 2 feedback_knee"
+    )
     feedback_knee: float = Field(0.005, gt=0, description="[m] capture-point error from which the share grows")
-    height: HeightSettings = HeightSettings()
-    whole_body: WholeBodySettings = WholeBodySettings()
-    gait: GaitSettings = GaitSettings()
-    contact: ContactSettings = ContactSettings()
+    height: HeightSettings = Field(HeightSettings(), description="Stage 1: the CoM height.")
+    whole_body: WholeBodySettings = Field(
+        WholeBodySettings(), description="Stage 2: horizontal CoM, ΔZ and joint velocities."
+    )
+    gait: GaitSettings = Field(GaitSettings(), description="Steps: timing, size, the swing foot.")
+    contact: ContactSettings = Field(ContactSettings(), description="Stage 3 and the life of a contact.")

@@ -11,7 +11,7 @@ from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
 from wbmpc.robot import Robot
 from wbmpc.scenario import ComHeightTask, LeanTask, Load, ReachTask, Task
-from wbmpc.signals import SIDES, Vector
+from wbmpc.signals import SIDES, TargetMove, Vector
 
 SHRINK_RATE, SHRINK_LIMIT = 1.0, 0.02  # [1/s], [m] how a held hand that stays short tightens its d
 
@@ -33,8 +33,14 @@ class Tasks:
         self.lift = lifts[0] if lifts else None
         self.heights = [task for task in tasks if isinstance(task, ComHeightTask)]
         self._excursions: list[Reach | Lean] = [*self.reaches, *self.leans]
+        self._by_index = dict(zip(_reach_indices(tasks), self.reaches, strict=True))
+        self._moves: list[TargetMove] = []  # ordered since the last plan
         self.current = self._pick()  # the reaches still to be done, or the lean that comes before them
         self.shrink = 0.0  # [m] by which d of a reach's hand is smaller than in its posture
+
+    def order(self, move: TargetMove) -> None:
+        """Take an order; the next `advance` carries it out, or says why not."""
+        self._moves.append(move)
 
     def advance(
         self,
@@ -55,6 +61,8 @@ class Tasks:
             palms, palm_forces: measured (2, 3) [m], [N]; `homes` (2, 3) [m]: where free palms hang.
             com: measured (3,) [m].
         """
+        while self._moves:
+            self._move(self._moves.pop(0), palms, events)
         if self.lift is not None:
             phase = self.lift.phase
             self.lift.advance(time, dt, palms=palms, palm_forces=palm_forces, homes=homes)
@@ -74,6 +82,18 @@ class Tasks:
             if task.progress.phase != before:
                 events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
                 self.current = self._pick()
+
+    def _move(self, move: TargetMove, palms: Vector, events: list[str]) -> None:
+        """Move a reach's target, unless its hand is no longer free for it."""
+        reach = self._by_index[move.task]
+        place = ", ".join(f"{x:.3f}" for x in move.target)
+        busy = "a lift has the hands" if self.lift is not None else "a lean is current" if self.leaning else ""
+        if busy and reach.progress.phase == TaskPhase.DONE:
+            events.append(f"reach {SIDES[reach.side]}: target not moved, {busy}")
+            return
+        reach.move(move.target, palm=palms[reach.side])
+        self.current = self._pick()
+        events.append(f"reach {SIDES[reach.side]}: target moved to ({place}) m")
 
     def takes_along(self, *, stepping: bool) -> bool:
         """Whether something that is carried goes with the CoM: from the first stride on."""
@@ -130,6 +150,11 @@ class Tasks:
     def rate(self) -> float:
         """Of the slowest task's clock, 0 … 1."""
         return min((task.progress.rate for task in self._excursions), default=1.0)
+
+
+def _reach_indices(tasks: tuple[Task, ...]) -> list[int]:
+    """Where the reaches are among all tasks."""
+    return [index for index, task in enumerate(tasks) if isinstance(task, ReachTask)]
 
 
 def _hand_of(task: ReachTask, palms: Vector) -> int:

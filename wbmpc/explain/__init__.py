@@ -1,0 +1,1 @@
+"""A recorded plan solved again, and what it was made of: terms, active constraints, multipliers, candidates."""
