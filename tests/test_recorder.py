@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wbmpc.recorder import LAYOUT, Recorder
+from wbmpc.columns import EVERY_TICK, SAMPLED
+from wbmpc.recorder import Recorder
 from wbmpc.signals import MAX_CONTACTS, RobotState, Setpoint, SolveStatus, StageReport, TorqueCommand, Truth
 from wbmpc.signals import PlanReport as Plan
 
@@ -65,20 +66,24 @@ def random_tick(rng: np.random.Generator, **truth: object) -> tuple:
 
 
 @settings(max_examples=20, deadline=None)
-@given(expected=st.integers(0, 12), ticks=st.integers(1, 30), seed=st.integers(0, 2**32 - 1))
-def test_round_trip_with_growth(expected: int, ticks: int, seed: int) -> None:
+@given(expected=st.integers(0, 12), stride=st.integers(1, 7), ticks=st.integers(1, 30), seed=st.integers(0, 2**32 - 1))
+def test_round_trip_with_growth(expected: int, stride: int, ticks: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    recorder = Recorder(Dimensions(), expected_ticks=expected)
+    recorder = Recorder(Dimensions(), expected_ticks=expected, stride=stride)
     history = [random_tick(rng) for _ in range(ticks)]
     for tick in history:
         recorder.append(*tick)
 
     assert recorder.ticks == ticks
-    for position, (_, prefix, names) in enumerate(LAYOUT):
-        for name in names:
-            np.testing.assert_array_equal(
-                getattr(recorder, prefix + name), np.array([getattr(tick[position], name) for tick in history])
-            )
+    samples = list(range(0, ticks, stride))
+    np.testing.assert_array_equal(recorder.sample_ticks, samples)
+    for parts, kept in ((EVERY_TICK, range(ticks)), (SAMPLED, samples)):
+        for cls, prefix, names in parts:
+            position = (Truth, RobotState, Setpoint, TorqueCommand).index(cls)
+            for name in names:
+                expected_rows = [getattr(history[k][position], name) for k in kept]
+                np.testing.assert_array_equal(getattr(recorder, prefix + name), np.array(expected_rows))
+    np.testing.assert_array_equal(recorder.states, np.column_stack([recorder.qpos, recorder.qvel]))
     for k, (truth, *_) in enumerate(history):
         contacts = recorder.contacts_at(k)
         for name in ("geoms", "position", "force", "distance"):
@@ -90,10 +95,23 @@ def test_round_trip_with_growth(expected: int, ticks: int, seed: int) -> None:
 def test_every_field_of_the_signals_is_recorded() -> None:
     """A field added to a signal must be recorded or excluded here on purpose."""
     elsewhere = {Truth: {"contact_geoms", "contact_position", "contact_force", "contact_distance"}}
-    for cls, _, layout in LAYOUT:
+    for cls in (Truth, RobotState, Setpoint, TorqueCommand):
+        kept = [name for of, _, layout in EVERY_TICK + SAMPLED if of is cls for name in layout]
         declared = {field.name for field in fields(cls)}
         same_as_truth = set() if cls is Truth else {"time"}
-        assert set(layout) == declared - elsewhere.get(cls, set()) - same_as_truth
+        assert sorted(kept) == sorted(declared - elsewhere.get(cls, set()) - same_as_truth)
+
+
+def test_contacts_of_any_ticks_in_any_order() -> None:
+    rng = np.random.default_rng(3)
+    recorder = Recorder(Dimensions(), expected_ticks=4)
+    for _ in range(9):
+        recorder.append(*random_tick(rng))
+    ticks = [7, 0, 7, 3]
+    for name in ("geoms", "position", "force", "distance"):
+        apart = [getattr(recorder.contacts_at(k), name) for k in ticks]
+        np.testing.assert_array_equal(getattr(recorder.contacts_of(ticks), name), np.concatenate(apart))
+    assert len(recorder.contacts_of([]).force) == 0
 
 
 def test_columns_do_not_alias_the_callers_arrays_and_are_read_only() -> None:
@@ -147,10 +165,11 @@ def test_unknown_column_lists_the_choices() -> None:
 def test_plan_events_join_the_runs_events() -> None:
     stage = StageReport(SolveStatus.SOLVED, 1e-3, 3)
     plan = Plan(
-        time=0.5, com=np.zeros((2, 3)), com_height_band=np.zeros((2, 2)), zmp=np.zeros((2, 2)),
+        time=0.5, mass=2.0, com=np.zeros((2, 3)), com_acceleration=np.zeros((2, 3)),
+        com_height_band=np.zeros((2, 2)), zmp=np.zeros((2, 2)),
         support_polygon=np.zeros((4, 2)), delta_z=np.zeros((2, 2)), hand_reference=np.zeros((2, 2, 3)),
         contact_force=np.zeros((2, 2, 3)), contact_phase=np.zeros(2, np.int64), contact_patch=("", ""), progress=1.0,
-        stage1=stage, stage2=stage, stage3=stage, candidates=(), plan_time=1e-3, events=("a", "b"),
+        stage1=stage, stage2=stage, stage3=stage, firing=None, plan_time=1e-3, events=("a", "b"),
     )  # fmt: skip
     recorder = Recorder(Dimensions(), expected_ticks=1)
     recorder.event(0.1, "start")

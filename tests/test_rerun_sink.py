@@ -19,7 +19,7 @@ from wbmpc.errors import WbmpcError
 from wbmpc.footage import Footage
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink import Patch, RerunSink
-from wbmpc.rerun_sink.documents import candidate_table, verdict_document
+from wbmpc.rerun_sink.documents import Table, firing_document, parts_of, verdict_document
 from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
 from wbmpc.rerun_sink.reading import Recording
@@ -259,6 +259,29 @@ def test_what_is_no_recording_is_named(tmp_path: Path, content: bytes | None, me
     assert "a.rrd" in str(caught.value)
 
 
+@pytest.mark.parametrize("stride", [2, 10])
+def test_a_recorder_that_samples_the_controller_gives_the_same_file(
+    tmp_path: Path, recorded: tuple[Recorder, Recording], stride: int
+) -> None:
+    recorder = small_run.new_recorder(stride=stride)
+    with open_sink(tmp_path / "sampled.rrd", recorder, block=0.0) as sink:
+        for count in (17, 83, 200):
+            small_run.append_ticks(recorder, count)
+            sink.flush(recorder.time[-1])
+    sampled, whole = Recording(tmp_path / "sampled.rrd"), recorded[1]
+    paths = ["/tracking/com_error", "/tracking/palm_error", "/joints/velocity", "/joints/posture_error", "/com/x"]
+    paths += [f"/contacts/{side}_{end}" for side in ("left", "right") for end in ("hand", "foot")]
+    for path in paths:
+        (time, values), (expected_time, expected) = (file.column(path, "scalars") for file in (sampled, whole))
+        np.testing.assert_array_equal(time, expected_time)
+        np.testing.assert_array_equal(values, expected)
+
+
+def test_a_recorder_that_samples_too_seldom_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(WbmpcError, match="keeps only every 4th tick"):
+        open_sink(tmp_path / "a.rrd", small_run.new_recorder(stride=4))
+
+
 def test_rates_must_divide(tmp_path: Path) -> None:
     for rate in (300.0, 2000.0):
         with pytest.raises(WbmpcError, match="does not divide"):
@@ -278,8 +301,10 @@ def test_every_text_in_the_file_is_drawable(tmp_path: Path) -> None:
     recorder = small_run.new_recorder()
     small_run.append_ticks(recorder, 30)
     plan = small_run.made_up_plan(50, np.random.default_rng(0))
-    bad = tuple(replace(c, patch=nasty, reason=nasty) for c in plan.candidates)
-    recorder.append_plan(replace(plan, candidates=bad, contact_patch=(nasty, nasty), events=(nasty,)))
+    bad = tuple(replace(c, patch=nasty, reason=nasty, beside=(nasty,)) for c in plan.candidates)
+    assert plan.firing is not None
+    firing = replace(plan.firing, candidates=bad, held=(nasty,))
+    recorder.append_plan(replace(plan, firing=firing, contact_patch=(nasty, nasty), events=(nasty,)))
     path = tmp_path / "a.rrd"
     patch = Patch(nasty, small_run.PATCHES["table_1"], np.array([0.0, 0, 1]))
     texts = {"scenario_name": nasty, "scenario_text": f"name: {nasty}", "joint_names": (nasty, "b")}
@@ -303,12 +328,27 @@ def test_drawable_keeps_what_the_viewer_has() -> None:
 
 
 def test_documents() -> None:
-    table = candidate_table(small_run.made_up_plan(50, np.random.default_rng(0)))
-    chosen, lost = table.splitlines()[-2:]
-    assert "**chosen**" in chosen
-    assert "0.0, 0.0, 6.0" in chosen
-    assert "| wall | right | – | -200 | – | – | unreachable by 20.0 cm |" in lost
+    plan = small_run.made_up_plan(50, np.random.default_rng(0))
+    text = firing_document(plan)
+    assert text.startswith("### Stage 3 fired at 0.05 s: **table_1** for the left hand\n")
+    assert "| at 0.45 s | -4.0 | +1.0 | +60.0 | +0.0 |\n| at task's end | -50.0 | +0.0 |" in text
+    assert "| **table_1** | left | 1.5000 | 0.2000 | 1.0000 | 0.3000 | chosen |" in text
+    assert "| **table_1** | left | 0.0, 0.0, 6.0 | 0.0, 1.0, 9.0 | 0.80 | +20 (palm) |" in text
+    assert "| wall | right | -200 (palm) | unreachable by 20.0 cm |" in text
+    assert firing_document(replace(plan, firing=None)) == "Stage 3 did not fire."
     text = verdict_document(VERDICT)
     assert text.startswith("## small: FAIL")
     assert r"| × | no_fall | 0.1 | 0.3 | m | a\|b |" in text
     assert verdict_document({}).endswith("no verdict")
+
+
+def test_a_documents_parts_are_what_it_was_made_of() -> None:
+    text = verdict_document(VERDICT)
+    title, (checks, metrics) = parts_of(text)
+    assert title == "small: FAIL"
+    assert isinstance(checks, Table)
+    assert list(checks.head) == ["", "check", "value", "threshold", "unit", "message"]
+    assert checks.rows == [["×", "no_fall", "0.1", "0.3", "m", "a|b"]]
+    assert metrics == Table(["metric", "value"], [["com_height_min", "0.25"]])
+    assert parts_of("one\n\ntwo") == ("", ["one", "two"])
+    assert parts_of("") == ("", [])

@@ -1,8 +1,7 @@
 """In-memory columns of one run: the only source of the checks and of the recording file.
 
-One row a tick, gathered in a small buffer and copied into a preallocated table that doubles when full: nothing is
-formatted, logged or allocated in the hot loop, and one place in memory is written, not one for each column. Contacts
-vary in number, so they are kept ragged: one flat table of contacts, and each tick's count.
+Columns are those of wbmpc/columns.py. Contacts vary in number, so they are kept ragged: one flat table of contacts, and
+each tick's count.
 The hash over the state trajectory lives here, whether or not a file is written.
 """
 
@@ -17,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.columns import EVERY_TICK, SAMPLED, Table
 from wbmpc.signals import PlanReport, RobotState, Setpoint, TorqueCommand, Truth
 from wbmpc.timing import LoopTiming
 
@@ -50,85 +50,22 @@ class Contacts:
     distance: NDArray[np.float64]  # (c,) [m] negative: penetration
 
 
-# Shapes of the recorded fields; "q", "v", "j" stand for the robot's nq, nv, nj, "Q" and "V" for the whole plant's.
-# Units and frames are those of wbmpc.signals.
-_Layout = dict[str, tuple[tuple[int | str, ...], type]]
-_TRUTH: _Layout = {
-    "time": ((), float),
-    "qpos": (("Q",), float),
-    "qvel": (("V",), float),
-    "torque": (("j",), float),
-    "torque_limit": (("j",), float),
-    "com": ((3,), float),
-    "com_velocity": ((3,), float),
-    "palm_position": ((2, 3), float),
-    "sole_position": ((2, 3), float),
-    "torso_up": ((), float),
-    "external_force": ((3,), float),
-    "zmp": ((2,), float),
-    "contact_count": ((), int),
-}
-_STATE: _Layout = {
-    "q": (("q",), float),
-    "v": (("v",), float),
-    "sole_wrench_in_world": ((2, 6), float),
-    "palm_force_in_world": ((2, 3), float),
-    "mass_scale": ((), float),
-}
-_SETPOINT: _Layout = {
-    "com_position": ((3,), float),
-    "com_velocity": ((3,), float),
-    "com_acceleration": ((3,), float),
-    "joint_position": (("j",), float),
-    "joint_velocity": (("j",), float),
-    "torso_rotation": ((3, 3), float),
-    "torso_angular_velocity": ((3,), float),
-    "foot_stance": ((2,), bool),
-    "foot_position": ((2, 3), float),
-    "foot_yaw": ((2,), float),
-    "foot_yaw_rate": ((2,), float),
-    "foot_velocity": ((2, 3), float),
-    "foot_acceleration": ((2, 3), float),
-    "hand_mode": ((2,), int),
-    "hand_position": ((2, 3), float),
-    "hand_velocity": ((2, 3), float),
-    "hand_acceleration": ((2, 3), float),
-    "hand_urgency": ((2,), float),
-    "hand_force": ((2, 3), float),
-    "hand_force_cap": ((2,), float),
-    "hand_normal": ((2, 3), float),
-    "hand_friction": ((2,), float),
-    "arm_keep_out": ((2, 3, 5), float),
-}
-_COMMAND: _Layout = {
-    "torque": (("j",), float),
-    "acceleration": (("v",), float),
-    "sole_wrench_in_world": ((2, 6), float),
-    "palm_force_in_world": ((2, 3), float),
-    "status": ((), int),
-    "solve_time": ((), float),
-    "fallback": ((), bool),
-}
-# Truth keeps its plain names ("com", "torque"); the controller's signals are prefixed ("state_q", "command_torque").
-LAYOUT: tuple[tuple[type, str, _Layout], ...] = (
-    (Truth, "", _TRUTH),
-    (RobotState, "state_", _STATE),
-    (Setpoint, "setpoint_", _SETPOINT),
-    (TorqueCommand, "command_", _COMMAND),
-)
-_TRUTH_FIELDS, _STATE_FIELDS, _SETPOINT_FIELDS, _COMMAND_FIELDS = (attrgetter(*fields) for _, _, fields in LAYOUT)
+_truth, _outcome = (attrgetter(*fields) for _, _, fields in EVERY_TICK)
+_state, _setpoint, _command = (attrgetter(*fields) for _, _, fields in SAMPLED)
 
 
 class Recorder:
     """Everything a run leaves behind, as trimmed numpy views.
 
-    Every name of `names` is an attribute of n rows, n the ticks so far: `recorder.time` (n,), `recorder.qpos` (n, nq),
-    `recorder.setpoint_com_position` (n, 3), `recorder.command_status` (n,). A view shows the ticks up to the moment it
-    was taken: take it anew rather than keep it.
+    Every name of `names` is an attribute. What checks judge has n rows, n the ticks so far: `recorder.time` (n,),
+    `recorder.qpos` (n, nq), `recorder.command_status` (n,). The controller's signals have a row for each of the m
+    `sample_ticks`: `recorder.state_q` (m, nq), `recorder.setpoint_com_position` (m, 3). A view shows what was there at
+    the moment it was taken: take it anew rather than keep it.
 
     Args:
         robot: gives nq, nv and nj.
         expected_ticks: rows allocated at the start; more ticks are welcome and cost one copy at each doubling.
+        stride: ticks from one sample of the controller's signals to the next.
         plant_nq, plant_nv: sizes of `Truth.qpos` and `Truth.qvel`, when the world has free objects besides the robot.
     """
 
@@ -137,26 +74,24 @@ class Recorder:
         robot: RobotDimensions,
         *,
         expected_ticks: int,
+        stride: int = 1,
         plant_nq: int | None = None,
         plant_nv: int | None = None,
     ) -> None:
-        size = {"Q": plant_nq or robot.nq, "V": plant_nv or robot.nv, "q": robot.nq, "v": robot.nv, "j": robot.nj}
-        self._capacity = max(1, expected_ticks)
-        row = [
-            (prefix + name, kind, tuple(size[s] if isinstance(s, str) else s for s in shape))
-            for _, prefix, fields in LAYOUT
-            for name, (shape, kind) in fields.items()
-        ]
-        self._table = np.zeros(self._capacity, np.dtype(row, align=True))
-        self._row = np.zeros((), self._table.dtype)
-        self._cells = tuple(self._row[name] for name in self.names)
-        self._qpos, self._qvel = self._row["qpos"].data, self._row["qvel"].data  # bytes for the hash
-        self._contact_capacity = 12 * self._capacity
+        sizes = {"Q": plant_nq or robot.nq, "V": plant_nv or robot.nv, "q": robot.nq, "v": robot.nv, "j": robot.nj}
+        self.stride = stride
+        self._every = Table(EVERY_TICK, sizes, expected_ticks)
+        self._sampled = Table(SAMPLED, sizes, -(-expected_ticks // stride))
+        self.names = self._every.names + self._sampled.names  # of all columns, each an attribute of the recorder
+        self._tables = {name: table for table in (self._every, self._sampled) for name in table.names}
+        self._state = _states(self._every.row.reshape(1)).data  # bytes for the hash
+        self._contact_capacity = 12 * max(1, expected_ticks)
         self._contact_total = 0
         self._contacts = self._allocate_contacts(self._contact_capacity)
         self._ticks = 0
         self._hash = hashlib.sha256()
         self.plans: list[PlanReport] = []
+        self.planned: list[tuple[RobotState, PlanReport]] = []  # those made from a snapshot of the run
         self.events: list[Event] = []
         self.timing = LoopTiming(expected_ticks=expected_ticks)  # filled by the loop; wall times, never compared
 
@@ -166,26 +101,25 @@ class Recorder:
         """Store one tick.
 
         Raises:
-            ValueError: on the first tick, when a value's shape is not the declared one (numpy would broadcast it).
+            ValueError: on the first tick, when a value's shape is not the declared one.
         """
         k = self._ticks
-        values = _TRUTH_FIELDS(truth) + _STATE_FIELDS(state) + _SETPOINT_FIELDS(setpoint) + _COMMAND_FIELDS(command)
-        if k == 0:
-            self._check_shapes(values)
-        elif k == self._capacity:
-            self._grow()
-        for cell, value in zip(self._cells, values, strict=True):
-            cell[...] = value
-        self._table[k] = self._row
+        self._every.put(k, _truth(truth) + _outcome(command))
+        if k % self.stride == 0:
+            self._sampled.put(k // self.stride, _state(state) + _setpoint(setpoint) + _command(command))
         self._append_contacts(truth)
         # The row's cells, not the caller's arrays: always contiguous float64, so equal states give equal bytes.
-        self._hash.update(self._qpos)
-        self._hash.update(self._qvel)
+        self._hash.update(self._state)
         self._ticks = k + 1  # last: a reader in another thread never sees a half-written row
 
-    def append_plan(self, plan: PlanReport) -> None:
-        """Store one plan; its events join the run's events at the plan's time."""
+    def append_plan(self, plan: PlanReport, snapshot: RobotState | None = None) -> None:
+        """Store one plan and what it was made from; its events join the run's events at the plan's time.
+
+        The snapshot must not change afterwards. None: of a plan made before the run began.
+        """
         self.plans.append(plan)
+        if snapshot is not None:
+            self.planned.append((snapshot, plan))
         for text in plan.events:
             self.event(plan.time, text)
 
@@ -201,24 +135,33 @@ class Recorder:
         return self._ticks
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of all columns, each an attribute of the recorder."""
-        return tuple(self._table.dtype.names or ())
+    def sample_ticks(self) -> NDArray[np.int64]:
+        """(m,) ticks that the rows of the controller's signals belong to."""
+        return np.arange(0, self._ticks, self.stride)
 
     @property
     def state_sha256(self) -> str:
         """Hex digest over (qpos, qvel) of every tick so far, in order, as native float64 bytes."""
         return self._hash.hexdigest()
 
+    @property
+    def states(self) -> NDArray[np.float64]:
+        """(n, nq + nv) qpos and qvel of every tick side by side: what the hash is over. A read-only view."""
+        view = _states(self._every.rows[: self._ticks])
+        view.flags.writeable = False
+        return view
+
     def column(self, name: str) -> NDArray[Any]:
-        """Column `name`, (ticks, ...), a read-only view.
+        """Column `name`, (n, ...) or (m, ...), a read-only view.
 
         Raises:
             KeyError: with the choices, when there is no such column.
         """
-        if name not in self.names:
+        table = self._tables.get(name)
+        if table is None:
             raise KeyError(f"no column {name!r}; choose one of {', '.join(self.names)}")
-        view: NDArray[Any] = self._table[name][: self._ticks]
+        rows = self._ticks if table is self._every else -(-self._ticks // self.stride)
+        view: NDArray[Any] = table.rows[name][:rows]
         view.flags.writeable = False
         return view
 
@@ -251,9 +194,10 @@ class Recorder:
 
     def contacts_of(self, ticks: Sequence[int] | NDArray[np.integer]) -> Contacts:
         """Contacts of the given ticks one after another; `contact_count[ticks]` says how many belong to each."""
-        ends = np.cumsum(self.contact_count)
-        rows = [np.arange(ends[k] - self.contact_count[k], ends[k]) for k in ticks]
-        index = np.concatenate(rows) if rows else np.zeros(0, np.int64)
+        ticks, count = np.asarray(ticks, int), self.contact_count
+        starts, lengths = (np.cumsum(count) - count)[ticks], count[ticks]
+        before = np.cumsum(lengths) - lengths  # rows of the answer before each tick's
+        index = np.repeat(starts - before, lengths) + np.arange(lengths.sum())
         table = self._contacts
         return Contacts(table.geoms[index], table.position[index], table.force[index], table.distance[index])
 
@@ -275,15 +219,6 @@ class Recorder:
         table.distance[start:stop] = truth.contact_distance[:count]
         self._contact_total = stop
 
-    def _check_shapes(self, values: tuple[Any, ...]) -> None:
-        for name, cell, value in zip(self.names, self._cells, values, strict=True):
-            if np.shape(value) != cell.shape:
-                raise ValueError(f"{name}: got shape {np.shape(value)}, expected {cell.shape}")
-
-    def _grow(self) -> None:
-        self._table = np.concatenate([self._table, np.zeros_like(self._table)])
-        self._capacity *= 2
-
     def _grow_contacts(self) -> None:
         old, rows = self._contacts, self._contact_capacity
         # At least one tick's worth of room, however small the table was.
@@ -291,3 +226,11 @@ class Recorder:
         new.geoms[:rows], new.position[:rows], new.force[:rows] = old.geoms, old.position, old.force
         new.distance[:rows] = old.distance
         self._contacts, self._contact_capacity = new, 2 * rows + 1000
+
+
+def _states(rows: NDArray[Any]) -> NDArray[np.float64]:
+    """qpos and qvel, which are neighbours in a row, as one array (n, nq + nv)."""
+    qpos, qvel = rows["qpos"], rows["qvel"]
+    first, second = (array.__array_interface__["data"][0] for array in (qpos, qvel))
+    assert second == first + qpos[0].nbytes, "qvel follows qpos in a row"
+    return np.lib.stride_tricks.as_strided(qpos, (len(rows), qpos.shape[1] + qvel.shape[1]))

@@ -81,6 +81,14 @@ class RobotState:
 
 
 @dataclass(frozen=True, slots=True)
+class TargetMove:
+    """An order to the planner in the middle of a run: from its next plan on the target of a reach is elsewhere."""
+
+    task: int  # index among the scenario's tasks, of a reach
+    target: Vector  # (3,) [m] in world
+
+
+@dataclass(frozen=True, slots=True)
 class Setpoint:
     """What the tracker follows at one tick, sampled from the latest plan."""
 
@@ -125,16 +133,39 @@ class TorqueCommand:
 
 @dataclass(frozen=True, slots=True)
 class CandidateReport:
-    """One candidate contact as stage 3 saw it when it fired: why it won or lost."""
+    """One candidate contact as stage 3 saw it when it fired: what it would cost and give, why it won or lost.
+
+    A candidate that cannot stand alone is weighed with the contacts that would be `beside` it; cost and parts are
+    then those of all of them together. Of one that was not weighed, or cannot give what is needed, the cost is inf,
+    parts and friction margin are nan and the forces zero.
+    """
 
     patch: str
     hand: int  # side index
     chosen: bool
-    cost: float  # objective with this candidate's H_i = 1; inf when infeasible
-    reach_slack: float  # [m] reach margin; negative: beyond the arm by that much
-    friction_margin: float  # [N] smallest slack of the friction cone over the knots; nan when infeasible
-    force: Vector  # (3,) [N] force wanted at the worst knot, zero when infeasible
+    cost: float  # stage 3's objective with this candidate's H_i = 1: the sum of the next three
+    way_cost: float  # w_i H_i: the way of the palm
+    force_cost: float  # of the forces over the knots
+    shift_cost: float  # of the ΔZ that the forces do not give
+    beside: tuple[str, ...]  # patches of the contacts that it was weighed with
+    palm: Vector  # (3,) [m] in world: centre of the palm on the patch
+    reach_slack: float  # [m] reach margin; negative: out of reach by that much
+    reach_limit: str  # what bounds it: "palm", "elbow", "obstacle" or "CoM"
+    friction_margin: float  # [N] smallest μ f_n − |f_t| over the knots
+    forces: Vector  # (k, 3) [N] wanted at the knots of the firing, in world, on the robot
     reason: str  # "chosen", "unreachable by 3.2 cm", "cost 1.8 above the best", ...
+
+
+@dataclass(frozen=True, slots=True)
+class Firing:
+    """One firing of stage 3: what it was asked, at k knots, and what it made of every candidate."""
+
+    knot_times: Vector  # (k,) [s] of the run; inf: where the running task ends
+    delta_z: Vector  # (k, 2) [m] the ZMP shift that fired it
+    zmp: Vector  # (k, 2) [m] the ZMP without contact, from which the shift goes
+    reserve: float  # [m] by which the feet's pressure is to be inside its polygon
+    held: tuple[str, ...]  # patches of the contacts that were there before, each with its hand
+    candidates: tuple[CandidateReport, ...]  # all of them, those that were not weighed too
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,7 +182,9 @@ class PlanReport:
     """The plan as the recording and the checks see it. N knots at times t + T, ..., t + N T."""
 
     time: float  # [s] time of the snapshot the plan was computed from
+    mass: float  # [kg] that the plan counts on
     com: Vector  # (N, 3) [m] planned CoM
+    com_acceleration: Vector  # (N, 3) [m/s²] times mass: the planned rate of momentum; the angular one is zero
     com_height_band: Vector  # (N, 2) [m] admissible band of stage 1
     zmp: Vector  # (N, 2) [m] planned ZMP of the feet
     support_polygon: Vector  # (k, 2) [m] vertices, counter-clockwise, margin not subtracted
@@ -164,9 +197,14 @@ class PlanReport:
     stage1: StageReport
     stage2: StageReport
     stage3: StageReport  # status NOT_RUN when it did not fire
-    candidates: tuple[CandidateReport, ...]  # non-empty when stage 3 fired in this plan
+    firing: Firing | None  # of stage 3 in this plan
     plan_time: float  # [s] wall time of the whole plan
     events: tuple[str, ...]  # "contact right table_2: chosen -> approaching", ...
+
+    @property
+    def candidates(self) -> tuple[CandidateReport, ...]:
+        """Every candidate when stage 3 fired in this plan, else none."""
+        return self.firing.candidates if self.firing else ()
 
 
 @dataclass(frozen=True, slots=True)

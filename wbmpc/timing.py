@@ -91,7 +91,8 @@ class LoopTiming:
     @property
     def plan_latency(self) -> FloatArray:
         """(plans,) [s] the loop's time from each plan's snapshot to its first use."""
-        return (np.array(self.effects, int) - np.array(self.snapshots, int)) * self.timestep
+        effects = np.array(self.effects, int)  # before the snapshots, which a reader in another thread may see more of
+        return (effects - np.array(self.snapshots[: len(effects)], int)) * self.timestep
 
     @property
     def plan_ready(self) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun.blueprint as rrb
@@ -10,9 +10,21 @@ from numpy.typing import ArrayLike
 
 from wbmpc.rerun_sink.stream import TIMELINE
 
-_EYE_OFFSET = np.array([-0.30, -1.05, 0.30])  # [m] from the robot: from its right, where a lean shows
+_EYE_OFFSET = np.array([-0.50, -0.72, 0.36])  # [m] to its right, where a lean shows, and behind: it sees what is ahead
 _LOOK_AHEAD = np.array([0.08, 0.0, -0.03])  # [m] what the robot reaches for is before it
 _BACKGROUND = (203, 214, 228)
+
+
+class _Lanes(NamedTuple):
+    """Lanes of states under a tab's plots."""
+
+    title: str
+    origin: str
+    lanes: int
+
+
+_PHASES = _Lanes("Stage 3 and contact phases", "/contact_phase", 3)
+_STATUS = _Lanes("Solver status", "/solver_status", 4)
 
 # Tab -> title of the plot -> entity whose curves it shows.
 _PLOTS = {
@@ -34,6 +46,11 @@ _PLOTS = {
         "Joint velocity [rad/s]": "/joints/velocity",
         "Joint position minus reference [rad]": "/joints/posture_error",
     },
+    "Solvers": {
+        "Planner [ms]": "/solvers/plan",
+        "Tracker, worst since the last sample [ms]": "/solvers/tracker",
+        "Iterations": "/solvers/iterations",
+    },
     "Contacts": {
         "Left hand [N]": "/contacts/left_hand",
         "Right hand [N]": "/contacts/right_hand",
@@ -41,10 +58,15 @@ _PLOTS = {
         "Right foot [N]": "/contacts/right_foot",
         "Penetration [mm]": "/contacts/penetration",
     },
-    "Solvers": {
-        "Planner [ms]": "/solvers/plan",
-        "Tracker [ms]": "/solvers/tracker",
-        "Iterations": "/solvers/iterations",
+    "Mismatch": {
+        "ZMP x [m]": "/zmp/x",
+        "ZMP y [m]": "/zmp/y",
+        "Left hand's force [N]": "/mismatch/left_hand",
+        "Right hand's force [N]": "/mismatch/right_hand",
+        "Vertical force of the feet [N]": "/mismatch/feet",
+        "CoM height in stage 1's band [m]": "/com/z",
+        "Rate of linear momentum [N]": "/mismatch/momentum_rate",
+        "Rate of angular momentum [Nm]": "/mismatch/angular_momentum_rate",
     },
     "Timing": {
         "Tick began late [ms]": "/timing/tick_start_late",
@@ -53,23 +75,36 @@ _PLOTS = {
         "Plan ready [ms]": "/timing/plan_ready",
     },
 }
-# Tab -> title and entity of the state lanes under its plots.
-_PHASES = ("Contact phases", "/contact_phase")
-_LANES = {"Overview": _PHASES, "Contacts": _PHASES, "Solvers": ("Solver status", "/solver_status")}
+# Whose colours the key does not explain.
+_WITH_LEGEND = ("/tracking/", "/planner/delta_z", "/solvers/plan", "/solvers/iterations")
+KEY = "/key"
+_LANE_SHARE, _KEY_SHARE = 0.087, 0.06  # of all plots' height: one lane, the key
+KEY_TEXT = (
+    "**Blue** measured, **amber** planned or commanded, **grey** limits; **x** red, **y** green, **z** blue, "
+    "pale if planned"
+)
+_LANES = {"Overview": _PHASES, "Planner": _PHASES, "Contacts": _PHASES, "Mismatch": _PHASES, "Solvers": _STATUS}
+_TWO_COLUMNS = ("Mismatch",)
+# Tab -> entity whose text it shows.
+_TEXTS = {"Stage 3": "/planner/candidates", "Verdict": "/verdict", "Scenario": "/scenario"}
 
 
-def layout(look_at: ArrayLike) -> Any:
-    """The default blueprint; `look_at` (3,) [m] is the centre of the 3D view."""
+def layout(look_at: ArrayLike, *, beside: str = "") -> Any:
+    """The default blueprint; `look_at` (3,) [m] is the centre of the 3D view.
+
+    `beside`: a prefix under which the file holds a second run, shown in the same views.
+    """
     look_target = np.asarray(look_at, dtype=float) + _LOOK_AHEAD
     # time_ranges stay unset: a range of zero width hides whatever falls between two samples.
     eye = rrb.EyeControls3D(position=look_target + _EYE_OFFSET, look_target=look_target, eye_up=(0, 0, 1))
-    scene = rrb.Spatial3DView(origin="/world", name="Robot", eye_controls=eye, line_grid=False, background=_BACKGROUND)
-    log = rrb.TextLogView(origin="/log", name="Events")
+    world = {"origin": "/world", "contents": _contents("/world", beside)}
+    scene = rrb.Spatial3DView(**world, name="Robot", eye_controls=eye, line_grid=False, background=_BACKGROUND)
+    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=[rrb.components.TextLogColumn("Body")])
+    log = rrb.TextLogView(origin="/log", contents=_contents("/log", beside), name="Events", columns=columns)
+    texts = _TEXTS | ({"Branch": f"{beside}/verdict"} if beside else {})
     tabs = rrb.Tabs(
-        *(_curves(name, plots, _LANES.get(name)) for name, plots in _PLOTS.items()),
-        rrb.TextDocumentView(origin="/planner/candidates", name="Stage 3"),
-        rrb.TextDocumentView(origin="/scenario", name="Scenario"),
-        rrb.TextDocumentView(origin="/verdict", name="Verdict"),
+        *(_curves(name, plots, beside) for name, plots in _PLOTS.items()),
+        *(rrb.TextDocumentView(origin=origin, name=name) for name, origin in texts.items()),
         active_tab=0,
     )
     left = rrb.Vertical(scene, log, row_shares=[3, 1])
@@ -81,13 +116,31 @@ def layout(look_at: ArrayLike) -> Any:
     return rrb.Blueprint(rrb.Horizontal(left, tabs, column_shares=[1, 1]), *panels, auto_layout=False, auto_views=False)
 
 
-def _curves(name: str, plots: dict[str, str], lanes: tuple[str, str] | None) -> Any:
-    """One tab: a plot above the other, and lanes of states at the bottom."""
+def _contents(origin: str, beside: str) -> list[str]:
+    """Of a view: what is under its origin, and the same of a second run."""
+    return ["$origin/**", *([f"{beside}{origin}/**"] if beside else [])]
+
+
+def _curves(name: str, plots: dict[str, str], beside: str) -> Any:
+    """One tab: a plot above the other, or two beside each other, and lanes of states at the bottom."""
     views: list[Any] = [
-        # With a legend for each of the joints there would be no room for their curves.
-        rrb.TimeSeriesView(origin=origin, name=title, plot_legend=rrb.PlotLegend(visible="/joints/" not in origin))
+        rrb.TimeSeriesView(
+            origin=origin,
+            contents=_contents(origin, beside),
+            name=title,
+            plot_legend=rrb.PlotLegend(visible=origin.startswith(_WITH_LEGEND)),
+        )
         for title, origin in plots.items()
     ]
-    if lanes:
-        views.append(rrb.StateTimelineView(origin=lanes[1], name=lanes[0]))
-    return rrb.Vertical(*views, name=name)
+    if name in _TWO_COLUMNS:
+        views = [rrb.Horizontal(*pair) for pair in zip(views[::2], views[1::2], strict=True)]
+    plots_share = float(len(views))
+    shares = [1.0] * len(views)
+    if name in _LANES:
+        below = _LANES[name]
+        views.append(
+            rrb.StateTimelineView(origin=below.origin, contents=_contents(below.origin, beside), name=below.title)
+        )
+        shares.append(_LANE_SHARE * below.lanes * plots_share * (2 if beside else 1))
+    views.append(rrb.TextDocumentView(origin=KEY, name="Key", titlebar=False))
+    return rrb.Vertical(*views, name=name, row_shares=[*shares, _KEY_SHARE * plots_share])

@@ -54,10 +54,29 @@ class Recording:
         order = np.argsort(times, kind="stable")
         return times[order], [values[i] for i in order]
 
+    def entities(self, component: str) -> list[str]:
+        """Entities that have a component over time, in order of their names."""
+        return sorted(
+            entity
+            for (entity, name), blocks in self._rows.items()
+            if name == component and any(time is not None for time, _ in blocks)
+        )
+
     def static(self, entity: str, component: str) -> list[Any]:
         """Value of a component that does not change; empty when it is not in the file."""
         blocks = [v for t, v in self._rows.get((entity, component), []) if t is None]
         return list(blocks[-1].to_pylist()[-1] or []) if blocks else []  # type: ignore[attr-defined]
+
+    def words(self, entity: str, component: str) -> tuple[FloatArray, list[str]]:
+        """Times (n,) [s] and texts: `words("/log/events", "text")`; "" where a row is empty."""
+        times, rows = self.column(entity, component)
+        return times, [str(row[0]) if len(row) else "" for row in rows]
+
+    def properties(self, name: str) -> dict[str, Any]:
+        """Named values of the whole file, as `Stream.properties` wrote them; empty when there are none."""
+        entity = f"/__properties/{name}"
+        names = [key for where, key in self._rows if where == entity and "." not in key]  # rerun's own have dots
+        return {key: value[0] for key in names if (value := self.static(entity, key))}
 
     def footage(self) -> Footage:
         """Everything that pictures need.
@@ -79,6 +98,15 @@ class Recording:
             contact_force=[v / METRES_PER_NEWTON for v in self._at(time, "/world/contacts", "vectors")],
             support_polygon=self._at(time, "/world/support_polygon", "strips"),
         )
+
+    def pushes(self, time: FloatArray) -> FloatArray:
+        """(n, 3) [N] the declared disturbance, each sample at the nearest of `time` (n,) [s]."""
+        stamps, vectors = self.column("/world/disturbance", "vectors")
+        force = np.zeros((len(time), 3))
+        for stamp, vector in zip(stamps, vectors, strict=True):
+            if vector.size:
+                force[np.abs(time - stamp).argmin()] = vector.reshape(-1, 3).sum(axis=0) / METRES_PER_NEWTON
+        return force
 
     def _at(self, time: FloatArray, entity: str, component: str) -> list[FloatArray]:
         stamps, values = self.column(entity, component)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wbmpc.errors import WbmpcError
 from wbmpc.recorder import Recorder
+from wbmpc.rerun_sink.documents import VERDICT
 from wbmpc.rerun_sink.reading import Recording
 from wbmpc.rerun_sink.stream import Stream
 from wbmpc.rerun_sink.timing import SCHEDULE
@@ -34,8 +35,7 @@ class RecordedRun:
 
 def checksums(recorder: Recorder, since: int = 0) -> NDArray[np.uint32]:
     """(ticks - since,) CRC-32 of each tick's (qpos, qvel): they tell where two runs part, which a hash cannot."""
-    pairs = zip(recorder.qpos[since:], recorder.qvel[since:], strict=True)
-    return np.array([crc32(qvel.tobytes(), crc32(qpos.tobytes())) for qpos, qvel in pairs], np.uint32)
+    return np.array([crc32(state) for state in np.ascontiguousarray(recorder.states[since:])], np.uint32)
 
 
 def describe_run(stream: Stream, document: Mapping[str, Any]) -> None:
@@ -56,6 +56,12 @@ def write_progress(stream: Stream, recorder: Recorder, since: int) -> None:
     )
 
 
+def recorded_verdict(recording: Recording) -> dict[str, Any] | None:
+    """The content of NAME.json; None when the run did not come to its end."""
+    text = recording.static(VERDICT, "json")
+    return json.loads(text[0]) if text else None
+
+
 def recorded_run(recording: Recording) -> RecordedRun:
     """What the recording says of its run.
 
@@ -65,7 +71,11 @@ def recorded_run(recording: Recording) -> RecordedRun:
     text = recording.static(_RUN, "run")
     if not text:
         of_ours = recording.static("/model", "mjb")
-        reason = "holds no schedule of plans" if of_ours else "not a recording of wbmpc (it holds no run)"
+        reason = (
+            "holds no schedule of plans (an interactive run cannot be made again)"
+            if of_ours
+            else "not a recording of wbmpc (it holds no run)"
+        )
         raise WbmpcError(f"{recording.path}: {reason}")
     _, hashes = recording.column(_PROGRESS, "state_sha256")
     if not hashes:

@@ -23,17 +23,30 @@ _XYZW = [1, 2, 3, 0]  # MuJoCo's wxyz -> rerun's xyzw
 
 @dataclass(frozen=True, slots=True)
 class Patch:
-    """A candidate contact patch as drawn."""
+    """A candidate contact patch as drawn: a rectangle."""
 
     name: str
-    corners: NDArray[np.float64]  # (k, 3) [m] in world, in order around the patch
+    corners: NDArray[np.float64]  # (4, 3) [m] in world, in order around the patch
     normal: NDArray[np.float64]  # (3,) out of the surface
+    friction: float = 0.5  # coefficient that the planner counts on
 
     @property
     def centre(self) -> NDArray[np.float64]:
         """(3,) [m] in world."""
         centre: NDArray[np.float64] = np.mean(self.corners, axis=0)
         return centre
+
+    @property
+    def frame(self) -> NDArray[np.float64]:
+        """(3, 3) rotation to world whose columns are the directions of two edges, and the normal."""
+        first = self.corners[1] - self.corners[0]
+        first = first / np.linalg.norm(first)
+        return np.column_stack([first, np.cross(self.normal, first), self.normal])
+
+    def half_size(self, thickness: float) -> NDArray[np.float64]:
+        """(3,) [m] half extents in its frame of a plate of that thickness."""
+        edges = self.corners[1] - self.corners[0], self.corners[2] - self.corners[1]
+        return np.array([*(0.5 * np.linalg.norm(edge) for edge in edges), 0.5 * thickness])
 
 
 class Scene:
@@ -55,15 +68,15 @@ class Scene:
     def write_poses(self, time: NDArray[np.float64], qpos: NDArray[np.float64]) -> None:
         """World poses of all bodies at `time` (n,) [s] from `qpos` (n, nq)."""
         model, data = self._model, self._data
-        position = np.empty((len(time), model.nbody, 3))
-        quaternion = np.empty((len(time), model.nbody, 4))
+        position = np.empty((model.nbody, len(time), 3), np.float32)  # as in the file, where each body has its own rows
+        quaternion = np.empty((model.nbody, len(time), 4), np.float32)
         for row, q in enumerate(qpos):
             data.qpos[: len(q)] = q
             mujoco.mj_kinematics(model, data)
-            position[row], quaternion[row] = data.xpos, data.xquat
+            position[:, row], quaternion[:, row] = data.xpos, data.xquat
+        quaternion = quaternion[:, :, _XYZW]
         for body, path in self._paths.items():
-            xyzw = quaternion[:, body][:, _XYZW]
-            self._stream.columns(path, time, rr.Transform3D.columns(translation=position[:, body], quaternion=xyzw))
+            self._stream.poses(path, time, position[body], quaternion[body])
 
     def _draw_geom(self, geom: int) -> None:
         model = self._model

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink.palette import AXES, FAULT, LEFT, LIMIT, MEASURED, PLANNED, RIGHT
-from wbmpc.rerun_sink.stream import Colour, Stream
+from wbmpc.rerun_sink.stream import Colour, Stream, worst_since_last
 from wbmpc.signals import SIDES, HandMode, SolveStatus
 
+FELL_BACK = ", fallback"
+CONTACT_GEOMS = "/contacts/geoms"  # who touches whom: pairs of MuJoCo's geom ids, one after another
 _HANDS = (LEFT, RIGHT)
 
 
@@ -32,7 +34,7 @@ def describe_ticks(stream: Stream, joint_names: Sequence[str]) -> None:
     colours = _hues(len(joint_names))
     for quantity in ("torque", "torque_limit", "torque_share", "velocity", "posture_error"):
         stream.series(f"/joints/{quantity}", joint_names, colours, width=1.0)
-    stream.series("/solvers/tracker", ["tracker [ms], worst since the last sample"], [MEASURED])
+    stream.series("/solvers/tracker", ["tracker"], [MEASURED])
 
     stream.static("/world/com/measured", rr.Points3D.from_fields(radii=0.012, colors=[MEASURED]))
     stream.static("/world/com/planned", rr.Points3D.from_fields(radii=0.010, colors=[PLANNED]))
@@ -55,24 +57,22 @@ def write_ticks(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], str
     _write_contacts(stream, recorder, rows, time)
     _write_joints(stream, recorder, rows, time)
     # Each sample carries the worst tick since the one before: thinning must not hide a slow solve.
-    worst = [recorder.command_solve_time[max(0, k - stride + 1) : k + 1].max() for k in rows]
-    stream.scalars("/solvers/tracker", time, 1e3 * np.array(worst))
+    stream.scalars("/solvers/tracker", time, 1e3 * worst_since_last(recorder.command_solve_time, rows, stride))
 
 
-def write_tracker_status(stream: Stream, recorder: Recorder, since: int) -> None:
-    """Send the changes of the tracker's status over all ticks from `since` on: thinning must not hide a failure."""
-    status, fallback = recorder.command_status[since:], recorder.command_fallback[since:]
+def write_tracker_status(stream: Stream, recorder: Recorder, since: int, until: int) -> None:
+    """Send the changes of the tracker's status over all ticks in since … until: thinning must not hide a failure."""
+    status, fallback = recorder.command_status[since:until], recorder.command_fallback[since:until]
     changed = np.ones(len(status), dtype=bool)
     changed[1:] = (status[1:] != status[:-1]) | (fallback[1:] != fallback[:-1])
     names = [
-        SolveStatus(s).name + (", fallback" if f else "")
-        for s, f in zip(status[changed], fallback[changed], strict=True)
+        SolveStatus(s).name + (FELL_BACK if f else "") for s, f in zip(status[changed], fallback[changed], strict=True)
     ]
-    stream.states("/solver_status/tracker", recorder.time[since:][changed], names)
+    stream.states("/solver_status/tracker", recorder.time[since:until][changed], names)
 
 
 def _write_balance(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]) -> None:
-    com, planned, zmp = recorder.com[rows], recorder.setpoint_com_position[rows], recorder.zmp[rows]
+    com, zmp, planned = recorder.com[rows], recorder.zmp[rows], recorder.setpoint_com_position[rows // recorder.stride]
     for i, axis in enumerate("xyz"):
         stream.scalars(f"/com/{axis}", time, np.column_stack([com[:, i], planned[:, i]]))
     for i, axis in enumerate("xy"):
@@ -83,7 +83,8 @@ def _write_balance(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], 
     floor_point = np.column_stack([com[:, :2], ground])
     stream.points("/world/com/measured", time, com)
     stream.points("/world/com/planned", time, planned)
-    stream.strips("/world/com/plumb_line", time, [[np.stack(pair)] for pair in zip(com, floor_point, strict=True)])
+    ends = np.hstack([com, floor_point]).reshape(-1, 3)
+    stream.lines("/world/com/plumb_line", time, ends, np.full(len(time), 2))
     stream.points("/world/zmp/measured", time, np.column_stack([zmp, ground]))
     push = recorder.external_force[rows]
     pushed = np.any(push != 0, axis=1)
@@ -93,13 +94,14 @@ def _write_balance(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], 
 def _write_hands_and_feet(
     stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]
 ) -> None:
-    palm, reference = recorder.palm_position[rows], recorder.setpoint_hand_position[rows]
-    guided = (recorder.setpoint_hand_mode[rows] != HandMode.FREE)[:, :, None]
+    samples = rows // recorder.stride
+    palm, reference = recorder.palm_position[rows], recorder.setpoint_hand_position[samples]
+    guided = (recorder.setpoint_hand_mode[samples] != HandMode.FREE)[:, :, None]
     reference = np.where(guided, reference, np.nan)
     stream.scalars("/tracking/palm_error", time, 1e3 * np.linalg.norm(palm - reference, axis=2))
-    sensed, planned = recorder.state_palm_force_in_world[rows], recorder.setpoint_hand_force[rows]
-    cap = recorder.setpoint_hand_force_cap[rows]
-    sole, command = recorder.state_sole_wrench_in_world[rows], recorder.command_sole_wrench_in_world[rows]
+    sensed, planned = recorder.state_palm_force_in_world[samples], recorder.setpoint_hand_force[samples]
+    cap = recorder.setpoint_hand_force_cap[samples]
+    sole, command = recorder.state_sole_wrench_in_world[samples], recorder.command_sole_wrench_in_world[samples]
     for i, side in enumerate(SIDES):
         norms = [np.linalg.norm(force[:, i], axis=1) for force in (sensed, planned)]
         stream.scalars(f"/contacts/{side}_hand", time, np.column_stack([*norms, cap[:, i]]))
@@ -114,6 +116,8 @@ def _write_hands_and_feet(
 def _write_contacts(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]) -> None:
     contacts, counts = recorder.contacts_of(rows), recorder.contact_count[rows]
     stream.force_arrows("/world/contacts", time, contacts.position, contacts.force, counts)
+    pairs = np.split(contacts.geoms.ravel(), 2 * np.cumsum(counts)[:-1])
+    stream.values(CONTACT_GEOMS, time, geoms=pairs)
     deepest = np.zeros(len(rows))
     np.maximum.at(deepest, np.repeat(np.arange(len(rows)), counts), -1e3 * contacts.distance)
     stream.scalars("/contacts/penetration", time, deepest)
@@ -121,14 +125,14 @@ def _write_contacts(stream: Stream, recorder: Recorder, rows: NDArray[np.int64],
 
 
 def _write_joints(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]) -> None:
-    torque, limit = recorder.torque[rows], recorder.torque_limit[rows]
+    torque, limit, samples = recorder.torque[rows], recorder.torque_limit[rows], rows // recorder.stride
     # The robot's own joints end the robot's part of q and v, whatever else the world holds.
-    position, velocity = (recorder.column(name)[rows][:, -torque.shape[1] :] for name in ("state_q", "state_v"))
+    position, velocity = (recorder.column(name)[samples][:, -torque.shape[1] :] for name in ("state_q", "state_v"))
     stream.scalars("/joints/torque", time, torque)
     stream.scalars("/joints/torque_limit", time, limit)
     stream.scalars("/joints/torque_share", time, np.abs(torque) / np.maximum(np.abs(limit), 1e-9))
     stream.scalars("/joints/velocity", time, velocity)
-    stream.scalars("/joints/posture_error", time, position - recorder.setpoint_joint_position[rows])
+    stream.scalars("/joints/posture_error", time, position - recorder.setpoint_joint_position[samples])
 
 
 def _hues(count: int) -> list[Colour]:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink.palette import FAULT, MEASURED, PLANNED
-from wbmpc.rerun_sink.stream import Stream
+from wbmpc.rerun_sink.stream import Stream, worst_since_last
 from wbmpc.timing import LoopTiming
 
 SCHEDULE = "/timing/schedule"
@@ -32,17 +32,21 @@ def write_tick_timing(stream: Stream, recorder: Recorder, rows: NDArray[np.int64
     if timing.realtime:  # in lockstep there is no clock to be late against
         columns["tick_start_late"] = timing.tick_late
     for name, column in columns.items():
-        worst = [column[max(0, k - stride + 1) : k + 1].max() for k in rows]
-        stream.scalars(f"/timing/{name}", time, 1e3 * np.array(worst))
+        stream.scalars(f"/timing/{name}", time, 1e3 * worst_since_last(column, rows, stride))
 
 
-def write_plan_timing(stream: Stream, timing: LoopTiming, since: int) -> None:
-    """Send the plans from the `since`-th on, at the times of their first use: latency, and the ticks for a replay."""
-    snapshots, effects = timing.snapshots[since:], timing.effects[since:]
+def write_plan_timing(stream: Stream, timing: LoopTiming, since: int) -> int:
+    """Send the plans from the `since`-th on, at the times of their first use: latency, and the ticks for a replay.
+
+    Returns the number of plans that are sent by now.
+    """
+    until = len(timing.ready or timing.effects)  # whole rows, while a loop goes on
+    snapshots, effects = timing.snapshots[since:until], timing.effects[since:until]
     if not effects:
-        return
+        return since
     time = np.array(effects) * timing.timestep
-    stream.scalars("/timing/plan_latency", time, 1e3 * timing.plan_latency[since:])
+    stream.scalars("/timing/plan_latency", time, 1e3 * timing.plan_latency[since:until])
     if timing.ready:
-        stream.scalars("/timing/plan_ready", time, 1e3 * timing.plan_ready[since:])
+        stream.scalars("/timing/plan_ready", time, 1e3 * timing.plan_ready[since:until])
     stream.values(SCHEDULE, time, snapshot_tick=snapshots, effect_tick=effects)
+    return until

@@ -1,0 +1,87 @@
+"""The planner's inputs in a recording: every snapshot that was planned from, to the bit, and a digest of its plan."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wbmpc.recorder import Recorder
+from wbmpc.rerun_sink.reading import Recording
+from wbmpc.rerun_sink.stream import Stream
+from wbmpc.signals import PlanReport, RobotState
+
+SNAPSHOTS = "/planner/snapshots"
+_STATE = ("q", "v", "sole_wrench_in_world", "palm_force_in_world", "mass_scale")
+_WALL_TIMES = {"solve_time", "plan_time"}
+_DIGEST_BYTES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedPlan:
+    """What one plan was made from, and which plan it was."""
+
+    state: RobotState
+    digest: str  # see `digest`
+
+
+def digest(report: PlanReport) -> str:
+    """Of every bit of a plan's report but its wall times: equal for equal plans."""
+    content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
+    _feed(content, report)
+    return content.hexdigest()
+
+
+def write_snapshots(stream: Stream, recorder: Recorder, since: int) -> None:
+    """Send the snapshots of the plans from number `since` on; the plan made before the run began has none."""
+    planned = recorder.planned[since:]
+    if not planned:
+        return
+    time = np.array([state.time for state, _ in planned])
+    columns = {name: [np.ravel(getattr(state, name)) for state, _ in planned] for name in _STATE}
+    digests = [digest(report) for _, report in planned]
+    stream.values(SNAPSHOTS, time, snapshot_time=list(time), digest=digests, **columns)
+
+
+def recorded_plans(recording: Recording) -> Sequence[RecordedPlan]:
+    """The plans of a recording in order; empty for one that is older than this module."""
+    columns: dict[str, list[NDArray[Any]]] = {
+        name: recording.column(SNAPSHOTS, name)[1] for name in ("snapshot_time", "digest", *_STATE)
+    }
+    return [
+        RecordedPlan(
+            RobotState(
+                time=float(time[0]),
+                q=q,
+                v=v,
+                sole_wrench_in_world=sole.reshape(2, 6),
+                palm_force_in_world=palm.reshape(2, 3),
+                mass_scale=float(mass[0]),
+            ),
+            str(made[0]),
+        )
+        for time, made, q, v, sole, palm, mass in zip(*columns.values(), strict=True)
+    ]
+
+
+def _feed(content: Any, value: Any) -> None:
+    if is_dataclass(value):
+        for field in fields(value):
+            if field.name not in _WALL_TIMES:
+                _feed(content, getattr(value, field.name))
+    elif isinstance(value, tuple):
+        content.update(f"({len(value)}".encode())
+        for item in value:
+            _feed(content, item)
+    elif value is None:
+        content.update(b"none")
+    elif isinstance(value, str):
+        content.update(f"{len(value)}:{value}".encode())
+    else:
+        array = np.asarray(value)
+        content.update(str(array.shape).encode())
+        content.update(np.ascontiguousarray(array).tobytes())
