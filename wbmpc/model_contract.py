@@ -12,6 +12,11 @@ from wbmpc.errors import RobotError
 from wbmpc.signals import GRAVITY, SIDES
 
 SITES = ("left_sole", "right_sole", "left_palm", "right_palm", "imu")
+IMU = {  # sensors that the estimator reads, all of the site `imu`
+    "imu_quaternion": mujoco.mjtSensor.mjSENS_FRAMEQUAT,
+    "imu_gyro": mujoco.mjtSensor.mjSENS_GYRO,
+    "imu_accelerometer": mujoco.mjtSensor.mjSENS_ACCELEROMETER,
+}
 MASS_TOLERANCE = 1e-9  # [kg]
 LENGTH_TOLERANCE = 1e-9  # [m]
 
@@ -29,18 +34,19 @@ def read(path: Path) -> tuple[mujoco.MjModel, pin.Model]:
     except ValueError as error:
         raise RobotError(f"{path}: MuJoCo refuses it: {' '.join(str(error).split())}") from None
     problems = [
-        *_tree_problems(mj_model),
-        *_servo_problems(mj_model),
-        *_named_problems(mj_model),
+        *tree_problems(mj_model),
+        *servo_problems(mj_model),
+        *named_problems(mj_model),
+        *sensor_problems(mj_model),
     ]
-    problems = problems or _contact_geom_problems(mj_model)  # these look the names up
+    problems = problems or contact_geom_problems(mj_model)  # these look the names up
     if problems:
         raise RobotError(f"{path}: {'; '.join(problems)}")
     try:
         pin_model = pin.buildModelFromMJCF(str(path))
     except (ValueError, RuntimeError) as error:
         raise RobotError(f"{path}: Pinocchio refuses it: {' '.join(str(error).split())}") from None
-    problems = _agreement_problems(mj_model, pin_model)
+    problems = agreement_problems(mj_model, pin_model)
     if problems:
         raise RobotError(f"{path}: {'; '.join(problems)}")
     return mj_model, pin_model
@@ -50,7 +56,7 @@ def _has(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> bool:
     return bool(mujoco.mj_name2id(model, kind, name) >= 0)
 
 
-def _tree_problems(model: mujoco.MjModel) -> list[str]:
+def tree_problems(model: mujoco.MjModel) -> list[str]:
     """A floating base named `root`, then hinges with ranges."""
     if model.njnt == 0 or model.jnt_type[0] != mujoco.mjtJoint.mjJNT_FREE or model.joint(0).name != "root":
         return ["the first joint must be <freejoint name='root'/>"]
@@ -66,7 +72,7 @@ def _tree_problems(model: mujoco.MjModel) -> list[str]:
     return problems
 
 
-def _servo_problems(model: mujoco.MjModel) -> list[str]:
+def servo_problems(model: mujoco.MjModel) -> list[str]:
     """Torque and speed limit of every hinge, and one plain torque motor each, in joint order."""
     problems = []
     for joint in range(1, model.njnt):
@@ -85,7 +91,7 @@ def _servo_problems(model: mujoco.MjModel) -> list[str]:
     return problems
 
 
-def _named_problems(model: mujoco.MjModel) -> list[str]:
+def named_problems(model: mujoco.MjModel) -> list[str]:
     problems = [f"no site {name!r}" for name in SITES if not _has(model, mujoco.mjtObj.mjOBJ_SITE, name)]
     if not _has(model, mujoco.mjtObj.mjOBJ_BODY, "torso"):
         problems.append("no body 'torso'")
@@ -106,7 +112,22 @@ def _named_problems(model: mujoco.MjModel) -> list[str]:
     return problems
 
 
-def _contact_geom_problems(model: mujoco.MjModel) -> list[str]:
+def sensor_problems(model: mujoco.MjModel) -> list[str]:
+    """The IMU's three sensors."""
+    problems = []
+    for name, kind in IMU.items():
+        tag = kind.name.removeprefix("mjSENS_").lower()
+        if not _has(model, mujoco.mjtObj.mjOBJ_SENSOR, name):
+            problems.append(f"no <{tag}> sensor {name!r}")
+            continue
+        sensor = model.sensor(name)
+        on_site = sensor.objtype[0] == mujoco.mjtObj.mjOBJ_SITE
+        if sensor.type[0] != kind or not on_site or model.site(int(sensor.objid[0])).name != "imu":
+            problems.append(f"sensor {name!r} is not a <{tag}> of site 'imu'")
+    return problems
+
+
+def contact_geom_problems(model: mujoco.MjModel) -> list[str]:
     """Sole sites on the bottom face of the foot boxes, palm sites in the centre of the palm spheres."""
     problems = []
     for side in SIDES:
@@ -120,7 +141,7 @@ def _contact_geom_problems(model: mujoco.MjModel) -> list[str]:
     return problems
 
 
-def _agreement_problems(mj_model: mujoco.MjModel, pin_model: pin.Model) -> list[str]:
+def agreement_problems(mj_model: mujoco.MjModel, pin_model: pin.Model) -> list[str]:
     """What Pinocchio reads differently without saying so."""
     problems = []
     names = [mj_model.joint(i).name for i in range(mj_model.njnt)]

@@ -1,0 +1,1 @@
+"""What `wbmpc doctor` looks at: the machine, and a robot's MJCF."""

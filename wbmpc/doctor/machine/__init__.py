@@ -1,0 +1,1 @@
+"""Of the machine and of what is installed on it."""

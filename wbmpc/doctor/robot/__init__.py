@@ -1,0 +1,1 @@
+"""Of a robot's MJCF: whatever it holds, every check answers."""
