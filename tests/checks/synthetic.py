@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from wbmpc.checks.context import CheckContext, Facts
-from wbmpc.recorder import LAYOUT, Recorder
-from wbmpc.signals import ContactPhase, SolveStatus, StageReport
+from wbmpc.columns import EVERY_TICK, SAMPLED
+from wbmpc.recorder import Recorder
+from wbmpc.signals import ContactPhase, RobotState, Setpoint, SolveStatus, StageReport, TorqueCommand, Truth
 
 FLOOR, LEFT_FOOT, RIGHT_FOOT, LEFT_PALM, RIGHT_PALM, TORSO, TABLE, WALL = range(8)
 GEOMS = ("floor", "left_foot", "right_foot", "left_palm", "right_palm", "torso", "table", "wall")
@@ -159,7 +160,8 @@ class SyntheticRun:
 
 def _zeros(recorder: Recorder) -> list[dict[str, Any]]:
     """For each signal, its fields by name, filled with zeros of the recorder's shapes."""
-    return [
-        {name: np.zeros(recorder.column(prefix + name).shape[1:], dtype) for name, (_, dtype) in fields.items()}
-        for _, prefix, fields in LAYOUT
-    ]
+    zeros: dict[type, dict[str, Any]] = {cls: {} for cls in (Truth, RobotState, Setpoint, TorqueCommand)}
+    for cls, prefix, fields in EVERY_TICK + SAMPLED:
+        for name, (_, dtype) in fields.items():
+            zeros[cls][name] = np.zeros(recorder.column(prefix + name).shape[1:], dtype)
+    return list(zeros.values())

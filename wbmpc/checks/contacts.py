@@ -22,17 +22,12 @@ class DeclaredContactsCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        contacts, facts = context.recorder.contacts, context.facts
-        robot_geom, other_geom, outside = context.contact_sides
-        both_robot = facts.geom_is_robot[robot_geom] & facts.geom_is_robot[other_geom]
-        foot_on_ground = outside & (facts.geom_foot[robot_geom] >= 0) & facts.geom_walkable[other_geom]
-        to_lift = [geom for thing in facts.lifted_objects for geom in thing.geoms]
-        palm_on_load = outside & (facts.geom_palm[robot_geom] >= 0) & np.isin(other_geom, to_lift)
-        declared = ~(outside | both_robot) | foot_on_ground | palm_on_load | self._chosen_palm(context)
-        force = np.linalg.norm(contacts.force, axis=1)  # (c,)
-        undeclared = ~declared & ~(force <= self.config.min_force)
+        facts = context.facts
+        robot_geom, other_geom, _ = context.contact_sides
+        undeclared = undeclared_contacts(context, self.config)
         if not undeclared.any():
             return at_most(name, 0.0, self.config.min_force, "N", "only declared pairs touched", when=None)
+        force = np.linalg.norm(context.recorder.contacts.force, axis=1)  # (c,)
         pairs = {(int(a), int(b)) for a, b in zip(robot_geom[undeclared], other_geom[undeclared], strict=True)}
         named = sorted(f"{facts.geom_name[a]} – {facts.geom_name[b]}" for a, b in pairs)
         more = f" and {len(named) - 3} more" if len(named) > 3 else ""
@@ -40,20 +35,33 @@ class DeclaredContactsCheck:
         when = first_time(context.contact_time, undeclared)
         return at_most(name, float(force[undeclared].max()), self.config.min_force, "N", message, when=when)
 
-    def _chosen_palm(self, context: CheckContext) -> NDArray[np.bool_]:
-        """(c,) contacts of a palm with the object of a patch that is, or within `release_time` was, chosen for it."""
-        facts, ticks = context.facts, context.recorder.ticks
-        robot_geom, other_geom, outside = context.contact_sides
-        tick, palm = context.recorder.contact_tick, facts.geom_palm[robot_geom]
-        grace = context.ticks(self.config.release_time)
-        declared = np.zeros(tick.size, dtype=bool)
-        for side in range(len(SIDES)):
-            chosen = np.array([patches[side] for patches in context.patch_of_tick])  # (n,) names
-            for patch in set(chosen.tolist()) - {""}:
-                on_object = outside & (palm == side) & np.isin(other_geom, list(facts.patch_geoms[patch]))
-                since = _ticks_since(chosen == patch, ticks)
-                declared |= on_object & (since[tick] <= grace)
-        return declared
+
+def undeclared_contacts(context: CheckContext, config: settings.DeclaredContacts) -> NDArray[np.bool_]:
+    """(c,) contacts, of more than a touch, that nobody declared."""
+    facts = context.facts
+    robot_geom, other_geom, outside = context.contact_sides
+    both_robot = facts.geom_is_robot[robot_geom] & facts.geom_is_robot[other_geom]
+    foot_on_ground = outside & (facts.geom_foot[robot_geom] >= 0) & facts.geom_walkable[other_geom]
+    to_lift = [geom for thing in facts.lifted_objects for geom in thing.geoms]
+    palm_on_load = outside & (facts.geom_palm[robot_geom] >= 0) & np.isin(other_geom, to_lift)
+    declared = ~(outside | both_robot) | foot_on_ground | palm_on_load | _chosen_palm(context, config.release_time)
+    return ~declared & ~(np.linalg.norm(context.recorder.contacts.force, axis=1) <= config.min_force)
+
+
+def _chosen_palm(context: CheckContext, release_time: float) -> NDArray[np.bool_]:
+    """(c,) contacts of a palm with the object of a patch that is, or within `release_time` was, chosen for it."""
+    facts, ticks = context.facts, context.recorder.ticks
+    robot_geom, other_geom, outside = context.contact_sides
+    tick, palm = context.recorder.contact_tick, facts.geom_palm[robot_geom]
+    grace = context.ticks(release_time)
+    declared = np.zeros(tick.size, dtype=bool)
+    for side in range(len(SIDES)):
+        chosen = np.array([patches[side] for patches in context.patch_of_tick])  # (n,) names
+        for patch in set(chosen.tolist()) - {""}:
+            on_object = outside & (palm == side) & np.isin(other_geom, list(facts.patch_geoms[patch]))
+            since = _ticks_since(chosen == patch, ticks)
+            declared |= on_object & (since[tick] <= grace)
+    return declared
 
 
 def _ticks_since(active: NDArray[np.bool_], ticks: int) -> NDArray[np.int64]:

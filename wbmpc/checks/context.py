@@ -88,12 +88,12 @@ class CheckContext:
         return self.time[self.recorder.contact_tick]
 
     @cached_property
-    def contact_sides(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    def contact_sides(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
         """Robot geom (c,), world geom (c,), and whether the contact joins the robot with the world (c,).
 
         Where it does not (self-collision, or two objects), the two geoms are in MuJoCo's order.
         """
-        geoms = self.recorder.contacts.geoms.astype(np.int64)
+        geoms = self.recorder.contacts.geoms
         robot = self.facts.geom_is_robot[geoms]  # (c, 2)
         swap = robot[:, 1] & ~robot[:, 0]
         ordered = np.where(swap[:, None], geoms[:, ::-1], geoms)

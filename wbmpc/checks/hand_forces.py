@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from wbmpc.checks import settings
 from wbmpc.checks.context import TOUCH, CheckContext
@@ -79,6 +78,8 @@ class HandForceCapsCheck:
         code = np.where(latest >= 0, np.take_along_axis(code, np.maximum(latest, 0), axis=0), -1)
         caps = np.array([*(context.facts.patch_force_cap[patch] for patch in names), np.inf])
         width = context.ticks(MEAN_TIME)
+        from scipy.ndimage import uniform_filter1d  # scipy: 25 MB that many runs do without
+
         # `origin` makes the filter's window end at the tick instead of surrounding it.
         mean = uniform_filter1d(context.push_along(code), width, axis=0, origin=(width - 1) // 2, mode="constant")
         excess = np.full(code.shape, -np.inf)

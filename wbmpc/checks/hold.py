@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
 from wbmpc.checks import settings
 from wbmpc.checks.context import SAMPLE_PERIOD, CheckContext
@@ -27,6 +26,8 @@ def best_hold(error: Vector, width: int) -> tuple[float, int, slice]:
     Returns:
         Largest error in the window, side index of the hand, and the window's ticks.
     """
+    from scipy.ndimage import maximum_filter1d  # scipy: 25 MB that many runs do without
+
     # maximum_filter1d centres its window; `origin` makes entry k cover ticks k .. k + width - 1.
     largest = maximum_filter1d(error, width, axis=0, origin=-(width // 2))[: len(error) - width + 1]
     largest = np.where(np.isfinite(largest), largest, np.inf)

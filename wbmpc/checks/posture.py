@@ -18,8 +18,9 @@ class CompletedCheck:
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
         recorder, duration = context.recorder, context.facts.duration
-        state = np.hstack([recorder.qpos, recorder.qvel, recorder.torque, recorder.com, recorder.com_velocity])
-        broken = first_time(context.time, ~np.isfinite(state).all(axis=1))
+        state = (recorder.qpos, recorder.qvel, recorder.torque, recorder.com, recorder.com_velocity)
+        finite = np.logical_and.reduce([np.isfinite(part).all(axis=1) for part in state])  # (n,)
+        broken = first_time(context.time, ~finite)
         if broken is not None:
             return failed(name, duration, "s", f"non-finite state at t = {broken:.3f} s", when=broken)
         end = float(context.time[-1]) + context.facts.timestep  # tick k covers [t_k, t_k + h]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from wbmpc.checks.context import CheckContext
 from wbmpc.signals import Vector
@@ -30,6 +29,8 @@ def com_outside(context: CheckContext, soles: NDArray[np.bool_]) -> Vector:
 
 def distance_outside(point: Vector, vertices: Vector) -> float:
     """Distance [m] of `point` (2,) from the convex hull of `vertices` (k, 2): positive outside, negative inside."""
+    from scipy.spatial import ConvexHull  # scipy: 25 MB that many runs do without
+
     hull = ConvexHull(vertices)
     corners = vertices[hull.vertices]  # counter-clockwise
     edge = np.roll(corners, -1, axis=0) - corners

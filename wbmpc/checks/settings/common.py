@@ -21,7 +21,7 @@ class HoldSettings(CheckSettings):
     stays farthest outside the support polygon of the feet, judged by its smallest distance in the window.
     """
 
-    hold: Positive = Field(description="[s]")
+    hold: Positive = Field(description="[s] how long")
     target: Vector3 | None = Field(
         default=None, description="[m] in world; default: the target of the scenario's reach task, if it has one"
     )

@@ -14,7 +14,7 @@ class Reach(HoldSettings):
     """One palm stays within `max` of the reach target during the whole hold."""
 
     kind: Literal["reach"]
-    max: Positive = Field(description="[m]")
+    max: Positive = Field(description="[m] largest distance between palm and target")
 
 
 class Withdrawn(CheckSettings):
@@ -30,7 +30,7 @@ class BraceForce(HoldSettings):
     """During the hold the hands' normal contact forces sum to at least `min` of the body weight."""
 
     kind: Literal["brace_force"]
-    min: Positive = Field(description="fraction of body weight")
+    min: Positive = Field(description="smallest sum of the hands' normal forces, as a share of body weight")
 
 
 class ContactPatches(CheckSettings):
@@ -69,7 +69,7 @@ class HandImpact(CheckSettings):
     """No palm is ever hit harder than `max`; friction counts as well."""
 
     kind: Literal["hand_impact"]
-    max: Positive = Field(description="of body weight")
+    max: Positive = Field(description="largest force of a palm, as a share of body weight")
 
 
 class HandForceCaps(CheckSettings):
@@ -86,4 +86,4 @@ class HandsFreeAtEnd(CheckSettings):
     """No palm touches anything during the last `duration`."""
 
     kind: Literal["hands_free_at_end"]
-    duration: Positive = Field(default=0.5, description="[s]")
+    duration: Positive = Field(default=0.5, description="[s] how long at the end")

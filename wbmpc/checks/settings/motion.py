@@ -14,7 +14,7 @@ class ComBeyondToes(HoldSettings):
     """During the hold the CoM's ground projection is at least `min` outside the feet's support polygon."""
 
     kind: Literal["com_beyond_toes"]
-    min: float = Field(description="[m]")
+    min: float = Field(description="[m] smallest distance outside the polygon of the soles")
 
 
 class TorquePeak(CheckSettings):
@@ -28,7 +28,7 @@ class ComHeight(CheckSettings):
     """The CoM comes within `max` of the height of every waypoint of the scenario's com_height task, about its time."""
 
     kind: Literal["com_height"]
-    max: Positive = Field(description="[m]")
+    max: Positive = Field(description="[m] largest distance from a waypoint's height")
     window: NonNegative = Field(default=0.1, description="[s] half-width around the waypoint's time")
 
 
@@ -37,8 +37,8 @@ class UprightAtEnd(CheckSettings):
 
     kind: Literal["upright_at_end"]
     min_torso_up: float = Field(default=0.95, gt=-1, lt=1, description="smallest cosine of the torso's tilt")
-    max_com_speed: Positive = Field(default=0.05, description="[m/s]")
-    duration: Positive = Field(default=0.5, description="[s]")
+    max_com_speed: Positive = Field(default=0.05, description="[m/s] largest speed of the CoM")
+    duration: Positive = Field(default=0.5, description="[s] how long at the end")
 
 
 class PushRecovery(CheckSettings):
@@ -49,8 +49,8 @@ class PushRecovery(CheckSettings):
 
     kind: Literal["push_recovery"]
     min_impulse: Positive = Field(description="[N·s/kg] per kg of robot, sum over the declared pushes' directions")
-    max_time: Positive = Field(default=3.0, description="[s]")
-    max_com_speed: Positive = Field(default=0.05, description="[m/s]")
+    max_time: Positive = Field(default=3.0, description="[s] longest recovery")
+    max_com_speed: Positive = Field(default=0.05, description="[m/s] CoM speed below which the push is recovered from")
 
 
 class Footsteps(WindowSettings):
@@ -114,7 +114,7 @@ class FootMoved(CheckSettings):
     """At the end the foot stands, loaded, at the target, and has come from far enough away."""
 
     kind: Literal["foot_moved"]
-    foot: Literal["left", "right"] = Field(description="which foot")
+    foot: Literal["left", "right"] = Field(description="which foot moves")
     tolerance: Positive = Field(description="[m] largest distance of the sole's centre from the target")
     target: Vector2 | None = Field(
         default=None, description="[m] world x, y; default: that of the foot's last step task"
@@ -129,7 +129,7 @@ class ComOutsideStance(CheckSettings):
     """
 
     kind: Literal["com_outside_stance"]
-    min: float = Field(description="[m]")
+    min: float = Field(description="[m] smallest distance outside the stance sole")
     min_torso_up: float = Field(
         default=0.7, gt=-1, lt=1, description="smallest cosine of the torso's tilt until 0.5 s after the landing"
     )

@@ -41,7 +41,7 @@ class Penetration(StrictModel):
     """No contact is deeper than `max`."""
 
     kind: Literal["penetration"] = "penetration"
-    max: Positive = Field(default=0.002, description="[m]")
+    max: Positive = Field(default=0.002, description="[m] deepest contact")
 
 
 class TorqueLimit(StrictModel):
