@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import wbmpc.render as pictures  # isort: skip  (before mujoco: it chooses the off-screen OpenGL)
@@ -10,7 +14,10 @@ import numpy as np
 import pytest
 import small_run
 from PIL import Image
+from typer.testing import CliRunner
 
+from wbmpc.cli import app
+from wbmpc.commands.render import RenderOptions, animation_times
 from wbmpc.errors import WbmpcError
 from wbmpc.footage import Footage
 
@@ -84,6 +91,69 @@ def test_strip_and_animation(footage: Footage, tmp_path: Path) -> None:
             assert animation.info["duration"] == 50
 
 
+@pytest.mark.parametrize(("suffix", "rate"), [(".webp", 30.0), (".gif", 30.0), (".gif", 50.0), (".webp", 7.0)])
+def test_an_animation_keeps_its_speed(tmp_path: Path, suffix: str, rate: float) -> None:
+    """A format's pauses are whole steps (a .gif's of 10 ms); rounded one by one they would add up to another speed."""
+    frames = [np.full((8, 8, 3), k, np.uint8) for k in range(60)]
+    pictures.save_animation(frames, tmp_path / f"a{suffix}", frame_rate=rate)
+    total = 0.0
+    with Image.open(tmp_path / f"a{suffix}") as animation:
+        for k in range(animation.n_frames):
+            animation.seek(k)
+            animation.load()
+            total += animation.info["duration"]
+    assert total == pytest.approx(60e3 / rate, abs=10)
+
+
+def test_a_video_has_its_frames_size_and_speed(tmp_path: Path) -> None:
+    ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    frames = [np.full((65, 97, 3), 4 * k, np.uint8) for k in range(50)]
+    pictures.save_animation(frames, tmp_path / "new" / "a.mp4", frame_rate=25.0)
+    reader = ffmpeg.read_frames(str(tmp_path / "new" / "a.mp4"))
+    about = next(reader)
+    assert (about["size"], about["fps"], about["duration"]) == ((96, 64), 25.0, 2.0)
+    shades = [np.frombuffer(frame, np.uint8).mean() for frame in reader]
+    np.testing.assert_allclose(shades, [4 * k for k in range(50)], atol=6)
+
+
+def test_without_its_writer_a_video_is_refused_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(WbmpcError, match=r"a\.mp4: .*pip install 'wbmpc\[video\]'") as caught:
+        pictures.save_animation([np.zeros((4, 4, 3), np.uint8)], tmp_path / "a.mp4", frame_rate=20.0)
+    assert "\n" not in str(caught.value)
+
+
+def test_times_of_an_animation(footage: Footage) -> None:
+    def times(**changes: float) -> list[float]:
+        given = {"times": (), "start": None, "end": None, "rate": 10.0, "speed": 1.0}
+        view = {"size": (8, 8), "azimuth": 0.0, "elevation": 0.0, "distance": 1.0}
+        return animation_times(footage, RenderOptions(**{**given, **view, **changes}))
+
+    np.testing.assert_allclose(times(), [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(times(start=0.1, end=0.2, speed=0.5), [0.1, 0.15])
+    np.testing.assert_allclose(times(speed=2.0), [0.0, 0.2])
+    with pytest.raises(WbmpcError, match="its end is not after its start"):
+        times(start=0.2, end=0.2)
+    with pytest.raises(WbmpcError, match="no sample at 7 s"):
+        times(end=7.0)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--out", "a.bmp"], r"choose one of \.png, \.webp, \.gif, \.mp4"),
+        (["--out", "a.mp4", "--time", "1"], "a video has no single times"),
+        (["--out", "a.png", "--from", "1"], r"a \.png does not move"),
+        (["--out", "a.webp", "--from", "1", "--time", "1"], "--time asks for pictures"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(words: list[str], message: str) -> None:
+    result = CliRunner().invoke(app, ["render", "absent.rrd", *words])
+    assert result.exit_code == 2
+    assert re.search(message, result.output)
+    assert result.output.count("\n") == 1
+
+
 def test_bad_requests_are_one_clear_line(footage: Footage, tmp_path: Path) -> None:
     frame = np.zeros((4, 4, 3), np.uint8)
     (tmp_path / "file").write_text("")
@@ -91,7 +161,7 @@ def test_bad_requests_are_one_clear_line(footage: Footage, tmp_path: Path) -> No
         pictures.render_frames(footage, [7.0])
     with pytest.raises(WbmpcError, match=r"choose one of \.png"):
         pictures.save_picture([frame], tmp_path / "a.bmp")
-    with pytest.raises(WbmpcError, match=r"\.webp or a \.gif"):
+    with pytest.raises(WbmpcError, match=r"one of \.webp, \.gif, \.mp4"):
         pictures.save_animation([frame], tmp_path / "a.png", frame_rate=20.0)
     with pytest.raises(WbmpcError, match="cannot write the picture"):
         pictures.save_picture([frame], tmp_path / "file" / "a.png")
@@ -114,3 +184,19 @@ def test_nearest_sample(footage: Footage, time: float, sample: int) -> None:
 
 def _rest(footage: Footage) -> tuple:
     return footage.com, footage.contact_position, footage.contact_force, footage.support_polygon
+
+
+@pytest.mark.parametrize("module", ["render", "commands.render", "commands.plot", "commands.report"])
+def test_an_opengl_is_chosen_before_mujoco_is_imported(module: str) -> None:
+    """MuJoCo reads MUJOCO_GL when it is first imported, and would look for a screen."""
+    code = (
+        "import importlib, os, sys\n"
+        "class Watch:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        assert name != 'mujoco' or os.environ.get('MUJOCO_GL'), 'mujoco is imported first'\n"
+        "sys.meta_path.insert(0, Watch())\n"
+        f"importlib.import_module('wbmpc.{module}')"
+    )
+    environment = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM")}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

@@ -64,6 +64,20 @@ class Footage:
         )
 
 
-def on_ground(points: FloatArray, height: float) -> FloatArray:
-    """(k, 2) -> (k, 3) [m] at `height`, just above the floor, or floor and drawing flicker."""
-    return np.column_stack([points, np.full(len(points), height + 1e-3)])
+def on_ground(points: FloatArray, height: float | FloatArray) -> FloatArray:
+    """(k, 2) -> (k, 3) [m] at `height`, one or (k,): just above the floor, or floor and drawing flicker."""
+    return np.column_stack([points, np.full(len(points), height) + 1e-3])
+
+
+def site_poses(model: Any, qpos: FloatArray, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
+    """Positions (n, s, 3) [m] and rotations (n, s, 3, 3) of named sites in world, in the postures `qpos` (n, nq)."""
+    import mujoco  # not with this file: render.py, which reads it, must choose an OpenGL before
+
+    data = mujoco.MjData(model)
+    sites = [model.site(name).id for name in names]
+    position, rotation = np.empty((len(qpos), len(sites), 3)), np.empty((len(qpos), len(sites), 3, 3))
+    for row, posture in enumerate(qpos):
+        data.qpos[: posture.size] = posture
+        mujoco.mj_kinematics(model, data)
+        position[row], rotation[row] = data.site_xpos[sites], data.site_xmat[sites].reshape(-1, 3, 3)
+    return position, rotation

@@ -7,6 +7,8 @@ the variable. Without it MuJoCo would look for a screen.
 from __future__ import annotations
 
 import ctypes
+import io
+import itertools
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -23,6 +25,7 @@ from PIL import Image
 
 from wbmpc.errors import WbmpcError
 from wbmpc.footage import Footage
+from wbmpc.video import save_video
 
 _NO_GL = "no off-screen OpenGL (MUJOCO_GL={backend}): {reason}. On Debian: apt-get install {packages}"
 _PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
@@ -56,11 +59,14 @@ except (AttributeError, RuntimeError) as error:  # MUJOCO_GL names a library tha
     raise _no_gl(error) from error
 
 FORMATS = (".png", ".webp", ".gif")
+ANIMATIONS = (".webp", ".gif", ".mp4")
+_GIF_RATE = 50  # [Hz] browsers take a shorter pause than 2 / 100 s for a mistake, and wait 10 / 100 s
 _METRES_PER_NEWTON = 0.015  # of an arrow: longer than in a recording, for a picture cannot be turned
 _FORCE_RGBA = (0.24, 0.55, 1.0, 1.0)
 _COM_RGBA = (1.0, 0.65, 0.16, 1.0)
 _SUPPORT_RGBA = (0.10, 0.45, 0.30, 1.0)
 _LOOK_AHEAD = (0.08, 0.0, 0.0)  # [m] from the CoM: what the robot reaches for is before it
+_DRAFT_SHADOWS = 1024  # [px] of the shadow map; MuJoCo's own is 4096
 _LEAST_DRAWN_FORCE = 0.2  # [N] a shorter arrow is all head
 
 
@@ -84,6 +90,7 @@ class Picture:
     camera: Camera = Camera()
     forces: bool = True  # contact forces, 15 mm a newton
     balance: bool = True  # CoM, its projection, and the support polygon
+    draft: bool = False  # no reflections, coarse shadows: quicker where no graphics card helps
 
 
 def render_frames(footage: Footage, times: Sequence[float], picture: Picture = Picture()) -> list[NDArray[np.uint8]]:
@@ -102,7 +109,7 @@ def render_segments(
 
     Raises as `render_frames`.
     """
-    picture = Picture(width=size, height=size, forces=False, balance=False)
+    picture = Picture(width=size, height=size, forces=False, balance=False, draft=True)
     shots = [(time, camera) for camera in cameras for time in times]
     found = _render(footage, shots, picture, segments=True)
     return [np.where(frame[..., 1] == mujoco.mjtObj.mjOBJ_GEOM, frame[..., 0], -1) for frame in found]
@@ -119,6 +126,8 @@ def _render(
     with _renderer(model, picture) as renderer:
         if segments:
             renderer.enable_segmentation_rendering()
+        if picture.draft:
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = 0
         for row, (_, camera) in zip(rows, shots, strict=True):
             centre = footage.com[rows[0]].copy()
             if camera.follow:
@@ -140,19 +149,62 @@ def save_picture(frames: Sequence[NDArray[np.uint8]], path: Path) -> None:
 
 
 def save_animation(frames: Sequence[NDArray[np.uint8]], path: Path, *, frame_rate: float) -> None:
-    """An endless .webp or .gif at `frame_rate` [Hz]."""
-    if path.suffix.lower() not in (".webp", ".gif"):
-        raise WbmpcError(f"{path}: an animation is a .webp or a .gif")
+    """An endless .webp or .gif, or a .mp4, at `frame_rate` [Hz].
+
+    Raises:
+        WbmpcError: another suffix, a .gif of more than 50 Hz, no writer of .mp4, or the file cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix not in ANIMATIONS:
+        raise WbmpcError(f"{path}: an animation is one of {', '.join(ANIMATIONS)}")
+    if suffix == ".mp4":
+        save_video(frames, path, frame_rate=frame_rate)
+        return
+    _write(path, encoded_animation(frames, suffix, frame_rate=frame_rate))
+
+
+def encoded_animation(frames: Sequence[NDArray[np.uint8]], suffix: str, *, frame_rate: float, **options: Any) -> bytes:
+    """The content of an endless .webp or .gif; `options` are the encoder's."""
+    if suffix == ".gif" and frame_rate > _GIF_RATE:
+        raise WbmpcError(f"a .gif has at most {_GIF_RATE} frames a second, not {frame_rate:g}; a .webp has more")
     first, *rest = [Image.fromarray(frame) for frame in frames]
-    _save(first, path, save_all=True, append_images=rest, duration=round(1000 / frame_rate), loop=0)
+    options |= {
+        "save_all": True,
+        "append_images": rest,
+        "loop": 0,
+        "duration": _durations(len(frames), suffix, frame_rate),
+    }
+    return _encoded(first, suffix, **options)
+
+
+def encoded_picture(frame: NDArray[np.uint8], suffix: str, **options: Any) -> bytes:
+    """The content of a picture file; `options` are the encoder's."""
+    return _encoded(Image.fromarray(frame), suffix, **options)
+
+
+def _durations(count: int, suffix: str, frame_rate: float) -> list[int]:
+    """(count,) [ms] in whole steps of the format that do not add up to another speed."""
+    step = 10 if suffix == ".gif" else 1
+    edges = [step * round(1000 * k / frame_rate / step) for k in range(count + 1)]
+    return [b - a for a, b in itertools.pairwise(edges)]
+
+
+def _encoded(image: Image.Image, suffix: str, **options: Any) -> bytes:
+    buffer = io.BytesIO()
+    image.save(buffer, suffix.removeprefix("."), **options)
+    return buffer.getvalue()
 
 
 def _save(image: Image.Image, path: Path, **options: Any) -> None:
     if path.suffix.lower() not in FORMATS:
         raise WbmpcError(f"{path}: unknown kind of picture; choose one of {', '.join(FORMATS)}")
+    _write(path, _encoded(image, path.suffix.lower(), **options))
+
+
+def _write(path: Path, content: bytes) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        image.save(path, **options)
+        path.write_bytes(content)
     except OSError as error:
         raise WbmpcError(f"cannot write the picture {path}: {error.strerror or error}") from error
 
@@ -162,6 +214,8 @@ def _renderer(model: Any, picture: Picture) -> Iterator[Any]:
     # The model's own off-screen buffer may be smaller than the picture; MuJoCo refuses rather than grow it.
     model.vis.global_.offwidth = max(model.vis.global_.offwidth, picture.width)
     model.vis.global_.offheight = max(model.vis.global_.offheight, picture.height)
+    if picture.draft:
+        model.vis.quality.shadowsize = min(model.vis.quality.shadowsize, _DRAFT_SHADOWS)
     try:
         renderer = mujoco.Renderer(model, picture.height, picture.width)
     except Exception as error:  # each OpenGL has its own kind

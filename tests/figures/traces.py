@@ -30,6 +30,8 @@ def still(samples: int = 101, **changes: Any) -> Trace:
         "palm": np.tile([[0.0, 0.1, 0.2], [0.0, -0.1, 0.2]], (samples, 1, 1)),
         "sole": soles,
         "sole_force": np.full((samples, 2), 17.0),
+        "torque_share": np.full((samples, 2), 0.2),
+        "joint_names": ("left_knee", "right_knee"),
         "hand_contacts": (),
     }
     return Trace(**{**columns, **changes})

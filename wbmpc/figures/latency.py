@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import matplotlib as mpl
 
-from wbmpc.figures.figure import DPI, WIDTH
-from wbmpc.figures.panels import FAULT, LIMIT, MEASURED
+from wbmpc.figures.figure import COLOUR, DPI, WIDTH
+from wbmpc.figures.panels import Ink
 
 _HEIGHT = 3.2  # [in]
 
@@ -24,12 +24,12 @@ def latency_figure(
     """
     figure = mpl.figure.Figure(figsize=(WIDTH, _HEIGHT), dpi=DPI, layout="constrained")
     axes = figure.subplots()
-    axes.axhspan(-1.1, 0.0, color=FAULT, alpha=0.08, lw=0)
-    axes.axhline(0.0, color=LIMIT, lw=1.0)
+    axes.axhspan(-1.1, 0.0, color=COLOUR[Ink.FAULT], alpha=0.08, lw=0)
+    axes.axhline(0.0, color=COLOUR[Ink.LIMIT], lw=1.0)
     styles = ("-", "--", ":", "-.")
     for place, (name, values) in enumerate(margins.items()):
         axes.plot(delay, values, color=f"C{place % 10}", ls=styles[place // 10 % 4], lw=1.4, marker=".", label=name)
-    for verdict, colour, marker in ((True, MEASURED, "o"), (False, FAULT, "X")):
+    for verdict, colour, marker in ((True, COLOUR[Ink.MEASURED], "o"), (False, COLOUR[Ink.FAULT], "X")):
         at = [d for d, ended in zip(delay, passed, strict=True) if ended is verdict]
         label = "the run passes" if verdict else "the run fails"
         axes.plot(at, [0.0] * len(at), color=colour, marker=marker, ms=7, ls="none", label=label, zorder=3)

@@ -39,6 +39,26 @@ def save_strip(footage: Footage, times: Sequence[float], path: Path, picture: pi
     pictures.save_picture([part for frame in labelled for part in (gap, frame)][1:], path)
 
 
+def picture_of(
+    footage: Footage,
+    trace: Trace,
+    moments: Sequence[float],
+    *,
+    size: tuple[int, int],
+    distance: float,
+    azimuth: float | None = None,
+) -> pictures.Picture:
+    """How to show the moments [s] of a run: the camera goes along; `azimuth` None is the side that shows most.
+
+    Raises:
+        WbmpcError: no OpenGL.
+    """
+    camera = pictures.Camera(distance=distance, follow=True)
+    if azimuth is None:
+        azimuth = best_azimuth(footage, trace, moments, camera)
+    return pictures.Picture(*size, camera=replace(camera, azimuth=azimuth))
+
+
 def best_azimuth(footage: Footage, trace: Trace, times: Sequence[float], camera: pictures.Camera) -> float:
     """Direction of view [deg] in which the world hides little of the robot and the motion goes across the picture.
 

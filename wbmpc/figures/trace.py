@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.checks.stretches import joined
-from wbmpc.footage import Footage
-from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
+from wbmpc.checks.stretches import joined, stretches
+from wbmpc.footage import Footage, site_poses
 from wbmpc.rerun_sink.reading import Recording
 from wbmpc.signals import SIDES
 
 FloatArray = NDArray[np.float64]
 TOUCH = 0.3  # [N] lighter touches of a palm are no contact
+_LEAST_SHARE = 0.004  # of the time axis: a shorter push would not be seen
 LEAST_GAP = 0.5  # [s] between two contacts of a hand: a palm that settles bounces a little
 
 
@@ -48,12 +46,21 @@ class Trace:
     palm: FloatArray  # (n, 2, 3) [m]
     sole: FloatArray  # (n, 2, 4, 3) [m] corners of both soles, in order around each
     sole_force: FloatArray  # (n, 2) [N] vertical, sensed
+    torque_share: FloatArray  # (n, nj) torque over what the servo can give at that speed
+    joint_names: tuple[str, ...]  # nj
     hand_contacts: tuple[HandContact, ...]
 
     @property
     def com_velocity(self) -> FloatArray:
         """(n, 3) [m/s]"""
         return np.asarray(np.gradient(self.com, self.time, axis=0)) if len(self.time) > 1 else np.zeros_like(self.com)
+
+    @property
+    def pushes(self) -> list[tuple[float, float]]:
+        """Start and end [s] of every declared push; a short one is drawn as long as can be seen."""
+        least = _LEAST_SHARE * float(np.ptp(self.time))
+        spans = [(float(self.time[a]), float(self.time[b - 1])) for a, b in stretches(np.any(self.push != 0, axis=1))]
+        return [(start, max(end, start + least)) for start, end in spans]
 
     @property
     def feet_travel(self) -> float:
@@ -78,6 +85,7 @@ def trace_of(recording: Recording, footage: Footage) -> Trace:
     com = np.stack([scalars(f"/com/{axis}", 2) for axis in "xyz"], axis=1)  # (n, 3, 2)
     hands = np.stack([scalars(f"/contacts/{side}_hand", 3) for side in SIDES], axis=1)  # (n, 2, 3)
     feet = np.stack([scalars(f"/contacts/{side}_foot", 2) for side in SIDES], axis=1)
+    joints = tuple(str(name) for name in recording.static("/joints/torque_share", "names"))
     palm, sole = _hands_and_feet(footage)
     return Trace(
         time=time,
@@ -89,10 +97,12 @@ def trace_of(recording: Recording, footage: Footage) -> Trace:
         delta_z=1e-3 * scalars("/planner/delta_z", 3)[:, 2],
         hand_force=hands[:, :, 0],
         hand_force_planned=hands[:, :, 1],
-        push=_pushes(recording, time),
+        push=recording.pushes(time),
         palm=palm,
         sole=sole,
         sole_force=feet[:, :, 0],
+        torque_share=scalars("/joints/torque_share", len(joints)),
+        joint_names=joints,
         hand_contacts=tuple(_hand_contacts(recording, time, hands[:, :, 0])),
     )
 
@@ -101,8 +111,7 @@ def _hand_contacts(recording: Recording, time: FloatArray, force: FloatArray) ->
     spacing = float(time[-1] - time[0]) / max(1, len(time) - 1)
     gap = round(LEAST_GAP / spacing) if spacing > 0 else 1
     for side, name in enumerate(SIDES):
-        stamps, states = recording.column(f"/contact_phase/{name}", "state")
-        words = [str(state[0]) if len(state) else "" for state in states]
+        stamps, words = recording.words(f"/contact_phase/{name}", "state")
         for first, stop in joined(force[:, side] > TOUCH, gap):
             start, end = float(time[first]), float(time[stop - 1])
             latest = int(np.searchsorted(stamps, 0.5 * (start + end), side="right")) - 1
@@ -110,28 +119,10 @@ def _hand_contacts(recording: Recording, time: FloatArray, force: FloatArray) ->
             yield HandContact(side, start, end, patch)
 
 
-def _pushes(recording: Recording, time: FloatArray) -> FloatArray:
-    stamps, vectors = recording.column("/world/disturbance", "vectors")
-    force = np.zeros((len(time), 3))
-    for stamp, vector in zip(stamps, vectors, strict=True):
-        if vector.size:
-            force[np.abs(time - stamp).argmin()] = vector.reshape(-1, 3).sum(axis=0) / METRES_PER_NEWTON
-    return force
-
-
 def _hands_and_feet(footage: Footage) -> tuple[FloatArray, FloatArray]:
     """Palm centres (n, 2, 3) and corners of the soles (n, 2, 4, 3) [m], from the recorded postures."""
-    model: Any = footage.model
-    data = mujoco.MjData(model)
-    palms = [model.site(f"{side}_palm").id for side in SIDES]
-    soles = [model.site(f"{side}_sole").id for side in SIDES]
-    size = model.geom(f"{SIDES[0]}_foot").size  # the model contract: a box whose underside the sole is
+    names = [f"{side}_{site}" for site in ("palm", "sole") for side in SIDES]
+    position, rotation = site_poses(footage.model, footage.qpos, names)
+    size = footage.model.geom(f"{SIDES[0]}_foot").size  # the model contract: a box whose underside the sole is
     corners = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]]) * size
-    palm, sole = np.empty((len(footage.time), 2, 3)), np.empty((len(footage.time), 2, 4, 3))
-    for row, qpos in enumerate(footage.qpos):
-        data.qpos[: qpos.size] = qpos
-        mujoco.mj_kinematics(model, data)
-        palm[row] = data.site_xpos[palms]
-        rotation = data.site_xmat[soles].reshape(2, 3, 3)
-        sole[row] = np.einsum("sij,kj->ski", rotation, corners) + data.site_xpos[soles][:, None]
-    return palm, sole
+    return position[:, :2], np.einsum("nsij,kj->nski", rotation[:, 2:], corners) + position[:, 2:, None]
