@@ -49,12 +49,17 @@ def open_run(path: Path, *, robot: Path | None = None) -> Replayable:
     Raises:
         WbmpcError: it is no recording, holds no schedule or no tick, or its run cannot be made by this program.
     """
-    run = recorded_run(Recording(path))
+    return run_of(Recording(path), robot=robot)
+
+
+def run_of(recording: Recording, *, robot: Path | None = None) -> Replayable:
+    """`open_run` of a recording that has been read."""
+    run = recorded_run(recording)
     document = run.document
     try:
         scenario = scenario_of(document, robot=robot)
     except WbmpcError as error:
-        raise WbmpcError(f"{path}: {error}") from None
+        raise WbmpcError(f"{recording.path}: {error}") from None
     return Replayable(document["name"], run, scenario, document["realtime"], same_source(document))
 
 
