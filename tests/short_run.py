@@ -30,21 +30,24 @@ def short(name: str, *, duration: float, **changes: Any) -> Scenario:
     return scenario.model_copy(update={"duration": duration})  # a file may not ask for less than one horizon
 
 
-def new_recorder(scenario: Scenario) -> Recorder:
-    return Recorder(ROBOT, expected_ticks=round(scenario.duration * scenario.loop.physics_rate))
+def new_recorder(scenario: Scenario, model: mujoco.MjModel | None = None) -> Recorder:
+    model = model or build_world(scenario, robot_path(scenario))
+    ticks = round(scenario.duration * scenario.loop.physics_rate)
+    return Recorder(ROBOT, expected_ticks=ticks, plant_nq=model.nq, plant_nv=model.nv)
 
 
 def finished(
     scenario: Scenario, *, run: Callable[..., LoopTiming] = run_lockstep, **arguments: Any
 ) -> tuple[LoopTiming, Recorder]:
     """The scenario run to its end."""
-    recorder = new_recorder(scenario)
-    return run(scenario, robot=ROBOT, recorder=recorder, **arguments), recorder
+    model = build_world(scenario, robot_path(scenario))
+    recorder = new_recorder(scenario, model)
+    return run(scenario, robot=ROBOT, recorder=recorder, model=model, **arguments), recorder
 
 
 def new_session(scenario: Scenario) -> tuple[Session, Recorder]:
-    recorder = new_recorder(scenario)
     model = build_world(scenario, robot_path(scenario))
+    recorder = new_recorder(scenario, model)
     return Session(scenario, robot=ROBOT, model=model, recorder=recorder), recorder
 
 

@@ -12,6 +12,7 @@ from wbmpc.signals import (
     MAX_CONTACTS,
     CandidateReport,
     ContactPhase,
+    Firing,
     HandMode,
     PlanReport,
     RobotState,
@@ -68,8 +69,8 @@ def compile_model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(MJCF)
 
 
-def new_recorder(expected_ticks: int = 100) -> Recorder:
-    recorder = Recorder(Robot(), expected_ticks=expected_ticks)
+def new_recorder(expected_ticks: int = 100, *, stride: int = 1) -> Recorder:
+    recorder = Recorder(Robot(), expected_ticks=expected_ticks, stride=stride)
     recorder.timing.begin(timestep=TICK, realtime=True)
     return recorder
 
@@ -164,26 +165,58 @@ def made_up_plan(k: int, rng: np.random.Generator, knots: int = 4) -> PlanReport
     stage = StageReport(SolveStatus.SOLVED, 1e-4 * rng.random(), 3)
     hand_reference = np.full((2, knots, 3), np.nan)
     hand_reference[0] = np.linspace([0.1, 0.15, 0.25], [0.3, 0.0, 0.2], knots)
-    candidates = (
-        CandidateReport("table_1", 0, True, 1.5, 0.02, 0.8, np.array([0.0, 0, 6.0]), "chosen"),
-        CandidateReport("wall", 1, False, np.inf, -0.2, np.nan, np.zeros(3), "unreachable by 20.0 cm"),
+    firing = Firing(
+        knot_times=np.array([k * TICK + 0.4, np.inf]),
+        delta_z=np.array([[-0.004, 0.001], [-0.05, 0.0]]),
+        zmp=np.array([[0.06, 0.0], [0.11, 0.0]]),
+        reserve=0.012,
+        held=(),
+        candidates=(
+            made_up_candidate("table_1", chosen=True, cost=1.5, reach_slack=0.02, reason="chosen"),
+            made_up_candidate("wall", hand=1, reach_slack=-0.2, reason="unreachable by 20.0 cm"),
+        ),
     )
     return PlanReport(
         time=k * TICK,
+        mass=2.4,
         com=np.linspace([0, 0, 0.31], [0.05, 0, 0.3], knots),
+        com_acceleration=np.tile([0.5, 0.0, -1.0], (knots, 1)),
         com_height_band=np.tile([0.25, 0.33], (knots, 1)),
         zmp=np.linspace([0, 0], [0.05, 0.01], knots),
         support_polygon=np.array([[0.05, 0.05], [-0.05, 0.05], [-0.05, -0.05], [0.05, -0.05]]),
         delta_z=np.tile([0.004, -0.001], (knots, 1)),
         hand_reference=hand_reference,
-        contact_force=np.zeros((2, knots, 3)),
+        contact_force=np.tile([[[0.2, 0.0, 3.0]], [[0.0, 0.0, 0.0]]], (1, knots, 1)),
         contact_phase=np.array([ContactPhase.CHOSEN if k >= 50 else ContactPhase.NONE, ContactPhase.NONE]),
         contact_patch=("table_1" if k >= 50 else "", ""),
         progress=1.0,
         stage1=stage,
         stage2=stage,
         stage3=stage if fired else StageReport(SolveStatus.NOT_RUN, 0.0, 0),
-        candidates=candidates if fired else (),
+        firing=firing if fired else None,
         plan_time=1e-3,
         events=("contact left table_1: needed -> chosen",) if fired else (),
+    )
+
+
+def made_up_candidate(
+    patch: str, *, reach_slack: float, reason: str, hand: int = 0, chosen: bool = False, cost: float = np.inf
+) -> CandidateReport:
+    """A candidate on the table; of one with a cost, 0.2 is for the way and 0.3 for the shift."""
+    weighed = np.isfinite(cost)
+    return CandidateReport(
+        patch=patch,
+        hand=hand,
+        chosen=chosen,
+        cost=cost,
+        way_cost=0.2 if weighed else np.nan,
+        force_cost=cost - 0.5 if weighed else np.nan,
+        shift_cost=0.3 if weighed else np.nan,
+        beside=(),
+        palm=np.array([0.3, 0.0, 0.22]),
+        reach_slack=reach_slack,
+        reach_limit="palm",
+        friction_margin=0.8 if weighed else np.nan,
+        forces=np.array([[0.0, 0, 6.0], [0.0, 1.0, 9.0]]) if weighed else np.zeros((2, 3)),
+        reason=reason,
     )

@@ -16,7 +16,7 @@ BASE = {"signals", "errors", "strict", "rotations", "jit"}
 ROBOT = BASE | {"model_contract", "robot", "kinematics", "frame_terms"}
 SETTINGS = BASE | {"settings", "scenario"}
 CONTROLLER = ROBOT | SETTINGS | {"qp"}
-RECORDS = BASE | {"timing", "recorder"}
+RECORDS = BASE | {"timing", "columns", "recorder"}
 LOOP = CONTROLLER | RECORDS | {"initial", "plant", "estimator", "planner", "tracker", "mailbox", "loop"}
 
 # Component -> the components that it may import, itself included. signals <- robot <- {plant, estimator,
@@ -43,24 +43,34 @@ ALLOWED = {
     "planner": CONTROLLER | {"planner"},  # knows nothing of the plant or of the tracker
     "tracker": CONTROLLER | {"tracker"},
     "timing": {"timing"},
+    "columns": BASE | {"columns"},
     "recorder": RECORDS,
     "footage": RECORDS | {"footage"},
-    "render": RECORDS | {"footage", "render"},
+    "video": BASE | {"video"},
+    "render": RECORDS | {"footage", "video", "render"},
     "rerun_sink": RECORDS | {"footage", "rerun_sink"},
     "figures": RECORDS | {"checks", "footage", "render", "rerun_sink", "figures"},
     "checks": RECORDS | ROBOT | {"settings", "checks"},
     "mailbox": BASE | {"planner", "mailbox"},
     "initial": ROBOT | SETTINGS | {"initial"},
     "loop": LOOP,
-    "realtime": LOOP | {"realtime", "planner_process"},
+    "slots": {"slots"},
+    "realtime": LOOP | {"slots", "realtime", "planner_process"},
+    "interact": LOOP | {"rerun_sink", "slots", "pool", "interact"},
     "planner_process": LOOP | {"pool", "warm_up", "planner_process"},
     "warm_up": LOOP | {"warm_up"},
     "facts": ROBOT | SETTINGS | {"checks", "facts"},
+    "triage": RECORDS | ROBOT | SETTINGS | {"checks", "facts", "footage", "provenance", "rerun_sink", "triage"},
     "metrics": RECORDS | {"checks", "metrics"},
     "versions": {"versions"},
-    "verdict": RECORDS | {"checks", "versions", "verdict"},
+    "verdict": RECORDS | {"checks", "triage", "versions", "verdict"},
+    "golden": BASE | {"verdict", "golden"},
+    "comparison": BASE | {"rerun_sink", "comparison"},
     "junit": {"checks", "junit"},
-    "counterfactuals": SETTINGS | {"verdict", "counterfactuals"},
+    "counterfactuals": SETTINGS | {"counterfactuals"},
+    "report": RECORDS
+    | SETTINGS
+    | {"checks", "footage", "render", "rerun_sink", "figures", "counterfactuals", "versions", "report"},
     "provenance": SETTINGS | {"versions", "provenance"},
     "session": LOOP
     | {
@@ -72,16 +82,25 @@ ALLOWED = {
         "provenance",
         "rerun_sink",
         "realtime",
+        "triage",
         "warm_up",
         "session",
     },
     "replay": LOOP | {"provenance", "rerun_sink", "replay"},
+    "explain": LOOP | {"checks", "versions", "verdict", "provenance", "rerun_sink", "replay", "explain"},
+    "parting": RECORDS | {"rerun_sink", "parting"},
+    "branch": LOOP
+    | {"checks", "verdict", "provenance", "rerun_sink", "replay", "explain", "parting", "session", "branch"},
     "sweep_journal": BASE | {"sweep_journal"},
     "pool": {"pool"},
     "sweep": SETTINGS | {"verdict", "session", "sweep_journal", "pool", "versions", "sweep"},
     "latency": SETTINGS | {"verdict", "session", "pool", "latency"},
+    "doctor": ROBOT | {"pool", "realtime", "warm_up", "doctor"},
     "commands": None,  # anything
-    "cli": {"commands", "scenario", "versions", "pool", "cli"},
+    "cli_options": {"cli_options"},
+    "cli_again": {"commands", "scenario", "cli_options", "cli_again"},
+    "cli_pictures": {"commands", "cli_options", "cli_pictures"},
+    "cli": {"commands", "scenario", "versions", "pool", "cli_options", "cli_again", "cli_pictures", "cli"},
     "__main__": {"cli", "__main__"},
 }
 

@@ -36,7 +36,19 @@ counterfactuals:
   weak: {{set: {{plant.mass_scale: 2.0}}, expect: fail, failing: [torque_peak]}}
   same: {{set: {{seed: 5}}, expect: pass}}
 """
-KEYS = ["scenario", "seed", "passed", "checks", "metrics", "solver", "timing", "versions", "state_sha256"]
+KEYS = [
+    "scenario",
+    "seed",
+    "passed",
+    "checks",
+    "triage",
+    "golden",
+    "metrics",
+    "solver",
+    "timing",
+    "versions",
+    "state_sha256",
+]
 KEPT_UP: dict[str, float] = {
     "real_time_factor": 1.5,
     "planner_rate": 98.5,
@@ -81,7 +93,9 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """Replaces the run: everything passes, but torque_peak fails at twice the mass. Collects the scenarios it ran."""
     ran: list[Any] = []
 
-    def run_scenario(scenario: Any, *, name: str, recording: Path | None, realtime: bool, on_progress: Any) -> Any:
+    def run_scenario(
+        scenario: Any, *, name: str, recording: Path | None, realtime: bool, on_progress: Any, viewer: str | None
+    ) -> Any:
         ran.append(SimpleNamespace(scenario=scenario, name=name, recording=recording, realtime=realtime))
         if on_progress is not None:
             on_progress(scenario.duration)

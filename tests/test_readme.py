@@ -19,12 +19,19 @@ from wbmpc.scenario import load_scenario
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 README = DOCUMENTS[0].read_text(encoding="utf-8")
+
+
+def lines_of(document: Path) -> str:
+    """Its text, with lines of the shell that go on in one."""
+    return document.read_text(encoding="utf-8").replace("\\\n", "")
+
+
 # A line of a shell block, or inline code, that begins with our command.
 COMMANDS = sorted(
     {
         line.split("  #")[0].strip()
         for document in DOCUMENTS
-        for line in re.findall(r"(?:^|`)(wbmpc [^`\n]+)", document.read_text(encoding="utf-8"), re.MULTILINE)
+        for line in re.findall(r"(?:^|`)(wbmpc [^`\n]+)", lines_of(document), re.MULTILINE)
     }
 )
 

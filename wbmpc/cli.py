@@ -7,6 +7,9 @@ from typing import Annotated
 
 import typer
 
+import wbmpc.cli_again
+import wbmpc.cli_pictures
+from wbmpc.cli_options import Debug, Files, Jobs, Out, Overrides, ScenarioFile, Seed
 from wbmpc.commands.exits import ExitCode, guarded
 from wbmpc.pool import one_thread_each
 
@@ -17,24 +20,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Closed-loop MuJoCo testbed for three-stage whole-body MPC with external contacts.",
 )
-
-Files = Annotated[list[Path], typer.Argument(metavar="SCENARIO", help="Scenario files (YAML).", show_default=False)]
-ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (YAML).", show_default=False)]
-RecordingFile = Annotated[Path, typer.Argument(metavar="RECORDING", help="An .rrd file.", show_default=False)]
-Seed = Annotated[int | None, typer.Option(min=0, help="Seed of all random numbers [the scenario's].")]
-Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
-Overrides = Annotated[
-    list[str],
-    typer.Option(
-        "--set",
-        metavar="KEY=VALUE",
-        default_factory=list,
-        help="Set a scenario key by its dotted path (lists by index), e.g. tasks.0.target.0=0.45; repeatable.",
-        show_default=False,
-    ),
-]
-Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Parallel processes [one per core].")]
-Debug = Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")]
 
 
 def main() -> None:
@@ -70,9 +55,19 @@ def run_command(
     seed: Seed = None,
     realtime: Annotated[bool, typer.Option("--realtime", help="Wall clock, the planner in its own thread.")] = False,
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no .rrd file.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Show the runs in a rerun viewer as they go on.")] = False,
+    view_at: Annotated[
+        str | None, typer.Option("--view-at", metavar="ADDRESS", help="In the viewer that listens at HOST:PORT.")
+    ] = None,
     counterfactuals: Annotated[
         bool, typer.Option("--counterfactuals", help="Also run each scenario's counterfactuals.")
     ] = False,
+    golden: Annotated[
+        Path | None, typer.Option("--golden", metavar="DIR", help="Compare with the golden results DIR/NAME.json.")
+    ] = None,
+    write_golden: Annotated[
+        Path | None, typer.Option("--write-golden", metavar="DIR", help="Make golden results of the runs that pass.")
+    ] = None,
     jobs: Jobs = None,
     debug: Debug = False,
 ) -> None:
@@ -89,10 +84,38 @@ def run_command(
             counterfactuals=counterfactuals,
             jobs=jobs,
             debug=debug,
+            golden=golden,
+            write_golden=write_golden,
+            view=view,
+            view_at=view_at,
         )
         return run(scenarios, options)
 
     raise typer.Exit(guarded(work, traceback_path=out / "run.traceback.txt", debug=debug))
+
+
+@app.command("interact", help="Run a scenario in MuJoCo's viewer, in real time: push the robot, move its targets.")
+def interact_command(
+    scenario: ScenarioFile,
+    overrides: Overrides,
+    out: Out = Path("out"),
+    seed: Seed = None,
+    duration: Annotated[float, typer.Option(min=1, max=3600, help="[s] how long a run goes on at least.")] = 120.0,
+    pace: Annotated[float, typer.Option(min=0.0625, max=1, help="Of real time; for machines that are too slow.")] = 1.0,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Write no .rrd file.")] = False,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.interact import InteractOptions, interact
+        from wbmpc.scenario import parse_overrides
+
+        changes = parse_overrides(overrides)
+        options = InteractOptions(
+            out=out, overrides=changes, seed=seed, duration=duration, pace=pace, record=not no_record
+        )
+        return interact(scenario, options)
+
+    raise typer.Exit(guarded(work, traceback_path=out / "interact.traceback.txt", debug=debug))
 
 
 @app.command("validate", help="Check scenario files without running them.")
@@ -103,6 +126,22 @@ def validate_command(scenarios: Files, debug: Debug = False) -> None:
         return validate(scenarios)
 
     raise typer.Exit(guarded(work, traceback_path=Path("validate.traceback.txt"), debug=debug))
+
+
+@app.command("doctor", help="Examine this machine and a robot's MJCF; exit code 1 when something must be fixed.")
+def doctor_command(
+    robot: Annotated[
+        str, typer.Option("--robot", metavar="MODEL", help="A model of models/ by name, or an .xml file.")
+    ] = "surena_mini",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON document.")] = False,
+    debug: Debug = False,
+) -> None:
+    def work() -> ExitCode:
+        from wbmpc.commands.doctor import doctor
+
+        return doctor(robot, as_json=as_json)
+
+    raise typer.Exit(guarded(work, traceback_path=Path("doctor.traceback.txt"), debug=debug))
 
 
 @app.command("schema", help="Print the JSON Schema of scenario files, for editors.")
@@ -164,76 +203,5 @@ def latency_command(
     raise typer.Exit(guarded(work, traceback_path=out / "latency.traceback.txt", debug=debug))
 
 
-@app.command("replay", help="Make a recording's run again in lockstep, plan by plan; exit code 1 when a bit differs.")
-def replay_command(
-    recording: RecordingFile,
-    robot: Annotated[
-        Path | None, typer.Option("--robot", metavar="FILE", help="The robot's MJCF, if it is elsewhere now.")
-    ] = None,
-    debug: Debug = False,
-) -> None:
-    def work() -> ExitCode:
-        from wbmpc.commands.replay import replay
-
-        return replay(recording, robot=robot)
-
-    raise typer.Exit(guarded(work, traceback_path=Path("out/replay.traceback.txt"), debug=debug))
-
-
-@app.command("render", help="Draw a recording (.rrd) without a screen: a picture, a strip of them, or an animation.")
-def render_command(
-    recording: RecordingFile,
-    target: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help=".png; .webp or .gif: animated unless one --time is given.")
-    ] = Path("out/render.png"),
-    times: Annotated[
-        list[float] | None,
-        typer.Option("--time", help="[s] repeatable; one picture each, or the ends of an animation [the last sample]."),
-    ] = None,
-    rate: Annotated[float, typer.Option(min=1, max=100, help="[Hz] frames a second of an animation.")] = 20.0,
-    width: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
-    height: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
-    azimuth: Annotated[float, typer.Option(help="[deg] direction of view about z: 90 along +y.")] = 75.0,
-    elevation: Annotated[float, typer.Option(help="[deg] negative: from above.")] = -14.0,
-    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.15,
-    debug: Debug = False,
-) -> None:
-    def work() -> ExitCode:
-        from wbmpc.commands.render import RenderOptions, render
-
-        options = RenderOptions(
-            times=times or [],
-            rate=rate,
-            size=(width, height),
-            azimuth=azimuth,
-            elevation=elevation,
-            distance=distance,
-        )
-        return render(recording, target, options)
-
-    raise typer.Exit(guarded(work, traceback_path=Path("out/render.traceback.txt"), debug=debug))
-
-
-@app.command("plot", help="Draw recordings (.rrd): a strip of key moments, and balance, hand forces and footsteps.")
-def plot_command(
-    recordings: Annotated[list[Path], typer.Argument(metavar="RECORDING", help="The .rrd files.", show_default=False)],
-    out: Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder [beside the recording].")] = None,
-    suffix: Annotated[str, typer.Option("--format", help="webp, png, or pdf, svg with the strip as webp.")] = "webp",
-    frames: Annotated[int, typer.Option(min=0, max=20, help="Pictures of the strip; 0: no strip.")] = 6,
-    width: Annotated[int, typer.Option(min=16, max=2048, help="[px] of each picture.")] = 210,
-    height: Annotated[int, typer.Option(min=16, max=2048, help="[px]")] = 270,
-    azimuth: Annotated[
-        float | None, typer.Option(help="[deg] direction of view about z: 90 along +y [what shows the motion best].")
-    ] = None,
-    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.05,
-    debug: Debug = False,
-) -> None:
-    def work() -> ExitCode:
-        from wbmpc.commands.plot import PlotOptions, plot
-
-        options = PlotOptions(
-            out=out, suffix=suffix, frames=frames, size=(width, height), azimuth=azimuth, distance=distance
-        )
-        return plot(recordings, options)
-
-    raise typer.Exit(guarded(work, traceback_path=Path("out/plot.traceback.txt"), debug=debug))
+app.add_typer(wbmpc.cli_again.app)
+app.add_typer(wbmpc.cli_pictures.app)

@@ -19,6 +19,7 @@ class Case:
 
     name: str
     failure: str | None
+    detail: str = ""  # of the failure: lines for whoever looks into it
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,13 +31,13 @@ class Suite:
     cases: Sequence[Case]
 
 
-def case_of(check: CheckResult) -> Case:
-    """Test case of one check."""
+def case_of(check: CheckResult, detail: str = "") -> Case:
+    """Test case of one check; `detail` is kept by a failing one."""
     if check.passed:
         return Case(check.name, None)
     when = "" if check.first_violation is None else f", first at t = {check.first_violation:.3f} s"
     text = f"value {check.value:.6g}, threshold {check.threshold:.6g} [{check.unit}]: {check.message}{when}"
-    return Case(check.name, text)
+    return Case(check.name, text, detail)
 
 
 def write_junit(path: Path, suites: Sequence[Suite]) -> None:
@@ -56,7 +57,7 @@ def write_junit(path: Path, suites: Sequence[Suite]) -> None:
         for case in suite.cases:
             item = ElementTree.SubElement(element, "testcase", classname=_clean(suite.name), name=_clean(case.name))
             if case.failure is not None:
-                ElementTree.SubElement(item, "failure", message=_clean(case.failure))
+                ElementTree.SubElement(item, "failure", message=_clean(case.failure)).text = _clean(case.detail) or None
     ElementTree.indent(root)
     ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Protocol
 
@@ -107,6 +108,14 @@ class Session:
         return within(command.torque, DIVERGED) and within(truth.qvel, DIVERGED)
 
 
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """A change in the middle of a run."""
+
+    tick: int  # which is the first one after it
+    change: Callable[[Session], None]
+
+
 def run_lockstep(
     scenario: Scenario,
     *,
@@ -117,6 +126,7 @@ def run_lockstep(
     on_progress: Callable[[float], None] | None = None,
     ended: Callable[[], str | None] | None = None,
     schedule: Schedule | None = None,
+    turn: Turn | None = None,
 ) -> LoopTiming:
     """Run a scenario in simulated time: the same seed gives the same bits on any machine, however slow.
 
@@ -131,6 +141,7 @@ def run_lockstep(
         ended: asked at every flush; a reason, which goes to the recorder's events, ends the run.
         schedule: when plans take effect, such as a threaded run's recorded one, which then repeats bit for bit; every
             planner period with the scenario's delay when not given.
+        turn: a change to make on the way.
 
     Returns:
         The recorder's `timing`.
@@ -150,18 +161,18 @@ def run_lockstep(
         tick = recorder.ticks  # which is being made
         solved = session.planner.solve(state)
         session.mailbox.post(solved, available_at=state.time + (effects[tick] - tick) * session.step)
-        recorder.append_plan(solved.report)
+        recorder.append_plan(solved.report, state)
         timing.plan(snapshot=tick, effect=effects[tick])
 
-    with no_garbage_collection():
-        start = perf_counter()
-        for k in range(schedule.ticks):
+    def ticks(first: int, end: int) -> bool:
+        """Make the ticks from `first` to before `end`; False: the run has ended on the way."""
+        for k in range(first, end):
             began = perf_counter()
             sound = session.tick(plan if k in effects else None)
             timing.tick(0.0, perf_counter() - began)
             if not sound:
                 recorder.event(session.plant.time, "state is not finite, run ended")
-                break
+                return False
             if (k + 1) % FLUSH_TICKS == 0:
                 if sink is not None:
                     sink.flush(session.plant.time)
@@ -169,7 +180,16 @@ def run_lockstep(
                     on_progress(session.plant.time)
                 if ended is not None and (reason := ended()):
                     recorder.event(session.plant.time, f"{reason}, run ended")
-                    break
+                    return False
+        return True
+
+    with no_garbage_collection():
+        start = perf_counter()
+        if turn is None:
+            ticks(0, schedule.ticks)
+        elif ticks(0, turn.tick):
+            turn.change(session)
+            ticks(turn.tick, schedule.ticks)
         timing.wall_time, timing.simulated_time = perf_counter() - start, session.plant.time
     return timing
 

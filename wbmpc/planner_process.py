@@ -11,7 +11,7 @@ from wbmpc.pool import Died, Worker
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world, robot_path
-from wbmpc.signals import RobotState
+from wbmpc.signals import RobotState, TargetMove
 from wbmpc.warm_up import compile_kernels
 
 _planner: Planner | None = None  # of this process, when it is the planner's
@@ -31,6 +31,11 @@ class PlannerProcess:
             RuntimeError: the process has ended instead.
         """
         self._worker: Worker[Any, Any] = Worker(_serve, 0, scenario)
+        self._answer()
+
+    def order(self, move: TargetMove) -> None:
+        """See `Tasks.order`; the process takes it before the next snapshot."""
+        self._worker.give(0, move)
         self._answer()
 
     def solve(self, state: RobotState) -> Plan:
@@ -57,8 +62,8 @@ class PlannerProcess:
         return answer
 
 
-def _serve(item: Scenario | RobotState) -> Plan | None:
-    """In the planner's process: take a scenario and get ready, or a snapshot and plan."""
+def _serve(item: Scenario | TargetMove | RobotState) -> Plan | None:
+    """In the planner's process: take a scenario and get ready, or an order, or a snapshot and plan."""
     global _planner
     if isinstance(item, Scenario):
         compile_kernels()
@@ -68,4 +73,7 @@ def _serve(item: Scenario | RobotState) -> Plan | None:
         _planner = Session(item, robot=robot, model=model, recorder=recorder).planner
         return None
     assert _planner is not None
+    if isinstance(item, TargetMove):
+        _planner.order(item)
+        return None
     return _planner.solve(item)

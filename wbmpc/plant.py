@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -9,11 +11,21 @@ from numpy.typing import NDArray
 from wbmpc.physics import Physics
 from wbmpc.plant_kernels import contact_sums, servo_torque
 from wbmpc.robot import Robot
-from wbmpc.scenario import Disturbance, SensorSettings
+from wbmpc.scenario import Disturbance, Impulse, SensorSettings
 from wbmpc.scenario.random_streams import Stream, generator
 from wbmpc.signals import MAX_CONTACTS, SIDES, Measurement, Truth, Vector
 
 MOST_SEEN = 4 * MAX_CONTACTS  # of MuJoCo's contacts, many of which may carry no force
+
+
+class _Push(NamedTuple):
+    """A constant force for a while."""
+
+    begin: float  # [s]
+    end: float  # [s]
+    body: int
+    force: Vector  # (3,) [N] in world
+    point: Vector  # (3,) [m] in the body's frame
 
 
 class Plant:
@@ -40,10 +52,11 @@ class Plant:
         self._step = model.opt.timestep
         self._rng = generator(seed, Stream.SENSOR_NOISE)
         self._noise = _noise_scales(sensors, robot.nj)
-        self._pushes = [
-            (d, model.body(d.body).id, np.array(d.impulse) / d.duration, np.array(d.point)) for d in disturbances
-        ]
         self._root = int(model.jnt_bodyid[0])
+        self._pushes: list[_Push] = []
+        self._held: tuple[_Push, ...] = ()
+        for disturbance in disturbances:
+            self.push(disturbance)
         self._sites = np.array([model.site(f"{side}_{name}").id for name in ("sole", "palm") for side in SIDES])
         self._torso = model.body("torso").id
         geom_body = model.geom_bodyid
@@ -63,10 +76,53 @@ class Plant:
         mujoco.mj_forward(model, self.data)  # the first measurement has an acceleration too
         mujoco.mj_step1(model, self.data)
 
+    def change(self, model: mujoco.MjModel, *, sensors: SensorSettings, disturbances: tuple[Disturbance, ...]) -> None:
+        """Go on in the world of `model`, of the same parts in the same places: other friction, other masses.
+
+        The state, and the random numbers of the sensors' noise, go on.
+        """
+        self._sensors, self._noise = sensors, _noise_scales(sensors, self._robot.nj)
+        self._pushes.clear()
+        for disturbance in disturbances:
+            self.push(disturbance)
+        self.data.qfrc_applied[:] = 0.0  # of a push that is no more
+        for name in dir(model):
+            mine, other = getattr(self.model, name), getattr(model, name)
+            if isinstance(other, np.ndarray) and not np.array_equal(mine, other, equal_nan=other.dtype.kind == "f"):
+                mine[...] = other
+        self.model.stat.meaninertia = model.stat.meaninertia
+        self._physics.step1()  # what the masses say of the present state
+
     @property
     def time(self) -> float:
         """Simulated time [s]."""
         return float(self.data.time)
+
+    def push(self, impulse: Impulse) -> None:
+        """Declare one more disturbance; one whose time is over does nothing."""
+        force = np.array(impulse.impulse) / impulse.duration
+        self._pushes.append(
+            _Push(impulse.time, impulse.end, self.model.body(impulse.body).id, force, np.array(impulse.point))
+        )
+
+    def hold(self, body: int, force: Vector, point: Vector) -> None:
+        """Declare a disturbance that lasts until `let_go`: a force on a point of a body.
+
+        Args:
+            force: (3,) [N] in world.
+            point: (3,) [m] in the body's frame.
+
+        Raises:
+            ValueError: the body is not one of the robot's: a force on the world would not be one on the robot.
+        """
+        if self.model.body_rootid[body] != self._root:
+            raise ValueError(f"{self.model.body(body).name or 'the world'} is no body of the robot")
+        self._held = (_Push(0.0, np.inf, body, force.copy(), point.copy()),)
+
+    def let_go(self) -> None:
+        """End what `hold` began."""
+        self._held = ()
+        self.data.qfrc_applied[:] = 0.0
 
     def measure(self) -> Measurement:
         """What the sensors say now. Contact forces are those of the last step: a force sensor integrates over one."""
@@ -138,12 +194,12 @@ class Plant:
     def _push(self, time: float) -> Vector:
         """Set the forces of the disturbances that act in the coming step; returns their sum (3,) [N]."""
         total = np.zeros(3)
-        if not self._pushes:
+        if not self._pushes and not self._held:
             return total
         d = self.data
         d.qfrc_applied[:] = 0.0
-        for push, body, force, point in self._pushes:
-            share = min(time + self._step, push.end) - max(time, push.time)
+        for begin, end, body, force, point in (*self._pushes, *self._held):
+            share = min(time + self._step, end) - max(time, begin)
             if share > 1e-9:
                 now = force * min(share / self._step, 1.0)
                 where = d.xpos[body] + d.xmat[body].reshape(3, 3) @ point

@@ -18,7 +18,7 @@ from typing import Any, Generic, TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # variables that BLAS libraries read at their import
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ def one_thread_each() -> None:
 
     The matrices are small: more threads only add jitter, and rounding that depends on the machine.
     """
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    os.environ.update(dict.fromkeys(THREADS, "1"))
 
 
 def finished(

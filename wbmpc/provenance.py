@@ -47,6 +47,15 @@ def scenario_of(document: Mapping[str, Any], *, robot: Path | None = None) -> Sc
         raise WbmpcError(f"the run is written in format {document.get('format')}, this is {FORMAT}")
     if others := _other_versions(document["versions"]):
         raise WbmpcError(f"made with other versions, which may round otherwise: {', '.join(others)}")
+    return settings_of(document, robot=robot)
+
+
+def settings_of(document: Mapping[str, Any], *, robot: Path | None = None) -> Scenario:
+    """The same to read in, not to run: whatever versions made it.
+
+    Raises:
+        WbmpcError: its robot is gone or has changed, or the scenario is no longer valid.
+    """
     path = robot or _place_of(document)
     if not path.is_file():
         raise WbmpcError(f"no robot {path}; say with --robot where its MJCF is now")

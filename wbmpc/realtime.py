@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from queue import Empty, SimpleQueue
 from threading import Thread
@@ -20,13 +20,15 @@ from wbmpc.planner_process import PlannerProcess
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world
-from wbmpc.signals import RobotState
+from wbmpc.signals import RobotState, TargetMove
+from wbmpc.slots import Slots
 from wbmpc.timing import LoopTiming
 
 SPIN = 3e-4  # [s] before a deadline in which the tick thread no longer trusts a sleep to end in time
 SWITCH_INTERVAL = 1e-4  # [s] after which the tick thread, awake, gets the interpreter back from the planner
 PRIORITY = 10  # of SCHED_FIFO, 1 … 99: before everything ordinary, behind what the system itself does
 WARM_UP_TICKS = 20  # made in a session that is thrown away: first calls load libraries and compile
+_Request = tuple[RobotState, Sequence[TargetMove]]
 
 
 def run_realtime(
@@ -38,6 +40,7 @@ def run_realtime(
     sink: Sink | None = None,
     on_progress: Callable[[float], None] | None = None,
     ended: Callable[[], str | None] | None = None,
+    operator: Operator | None = None,
 ) -> LoopTiming:
     """Run a scenario against the wall clock; `run_lockstep` has these arguments too, and makes the same ticks.
 
@@ -55,6 +58,7 @@ def run_realtime(
     late, a snapshot that a newer one replaced before the planner came to it as skipped.
 
     Args:
+        operator: asked before every tick; it may slow the clock down, push the robot, give orders, and end the run.
         sink: flushed once, after the last tick, because a flush waits for the file: a killed run leaves an empty one.
 
     Returns:
@@ -72,6 +76,7 @@ def run_realtime(
     timing.begin(timestep=step, realtime=True)
     finished = Mailbox()  # the tracker sees a plan only when the tick has taken it over and counted its latency
     due = False
+    asked: dict[float, RobotState] = {}  # snapshots by their time [s]; those that a newer one replaces stay
 
     def exchange(state: RobotState) -> None:
         """Take the plans that are ready, hand over a snapshot when one is due."""
@@ -80,22 +85,26 @@ def run_realtime(
             snapshot, ready = round(plan.time / step), recorder.ticks
             effect = max(ready, snapshot + delay)
             session.mailbox.post(plan, available_at=plan.time + (effect - snapshot) * step)
-            recorder.append_plan(plan.report)
+            recorder.append_plan(plan.report, asked.pop(plan.report.time))
             timing.plan(snapshot=snapshot, effect=effect, ready=ready)
             timing.late_plans += ready - snapshot > max(delay, period)
         if due:
-            worker.request(state)
+            asked[state.time] = state
+            worker.request(state, operator.orders() if operator is not None else ())
 
     with (
         _planner(scenario, session) as planner,
         PlannerThread(planner, finished) as worker,
         _undisturbed(),
-        _ahead_of_others() as ahead,
+        ahead_of_others() as ahead,
     ):
         timing.realtime_priority = ahead
-        start = perf_counter()
+        slots = Slots(perf_counter(), step)
         for k in range(session.ticks):
-            slot = start + k * step
+            if operator is not None and not operator.attend(session, slots, k):
+                recorder.event(session.plant.time, "ended by the operator")
+                break
+            slot = slots.of(k)
             late = _wait_until(slot)
             timing.missed_deadlines += late > step
             due = k % period == 0 and k > 0
@@ -110,7 +119,7 @@ def run_realtime(
                 if ended is not None and (reason := ended()):
                     recorder.event(session.plant.time, f"{reason}, run ended")
                     break
-        timing.wall_time, timing.simulated_time = perf_counter() - start, session.plant.time
+        timing.wall_time, timing.simulated_time = perf_counter() - slots.start(timing.ticks), session.plant.time
     worker.check()
     timing.skipped_plans = worker.skipped
     if sink is not None:
@@ -121,7 +130,20 @@ def run_realtime(
 class AnyPlanner(Protocol):
     """A planner, wherever it computes."""
 
+    def order(self, move: TargetMove) -> None: ...
     def solve(self, state: RobotState) -> Plan: ...
+
+
+class Operator(Protocol):
+    """Somebody who watches a run against the wall clock and takes part in it."""
+
+    def attend(self, session: Session, slots: Slots, tick: int) -> bool:
+        """Called before every tick, so nearly always with nothing to do; False ends the run."""
+        ...
+
+    def orders(self) -> Sequence[TargetMove]:
+        """What the planner is told with its next snapshot; each order is given once."""
+        ...
 
 
 class PlannerThread:
@@ -133,15 +155,15 @@ class PlannerThread:
     def __init__(self, planner: AnyPlanner, mailbox: Mailbox) -> None:
         """`planner` is used by this thread alone from entry to exit; `mailbox` receives its plans."""
         self._planner, self._mailbox = planner, mailbox
-        self._requests: SimpleQueue[RobotState | None] = SimpleQueue()  # None: stop
+        self._requests: SimpleQueue[_Request | None] = SimpleQueue()  # None: stop
         self._thread = Thread(target=self._run, name="planner", daemon=True)
         self._error: BaseException | None = None
         self._at = 0.0  # [s] time of the snapshot in work
         self.skipped = 0  # snapshots that a newer one replaced
 
-    def request(self, snapshot: RobotState) -> None:
-        """Ask for a plan. The snapshot must not change afterwards."""
-        self._requests.put(snapshot)
+    def request(self, snapshot: RobotState, orders: Sequence[TargetMove] = ()) -> None:
+        """Ask for a plan, under new orders. The snapshot must not change afterwards."""
+        self._requests.put((snapshot, orders))
 
     def check(self) -> None:
         """Raise a RuntimeError when the planner has raised, from what it raised."""
@@ -163,16 +185,19 @@ class PlannerThread:
         # A thread that only hands over to a process must not wait for a core that this process keeps busy.
         hands_over = isinstance(self._planner, PlannerProcess)
         try:
-            with _ahead_of_others() if hands_over else nullcontext():
-                while (snapshot := self._newest()) is not None:
+            with ahead_of_others() if hands_over else nullcontext():
+                while (request := self._newest()) is not None:
+                    snapshot, orders = request
                     self._at = snapshot.time
+                    for order in orders:
+                        self._planner.order(order)
                     # Ready is ready: whichever tick comes next may use it.
                     self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
         except BaseException as error:  # a thread cannot raise into another: `check` does
             self._error = error
 
-    def _newest(self) -> RobotState | None:
-        """Wait for a request; of several that wait, the newest. None: stop."""
+    def _newest(self) -> _Request | None:
+        """Wait for a request; of several that wait, the newest, with the orders of all. None: stop."""
         newest = self._requests.get()
         while newest is not None:
             try:
@@ -180,7 +205,7 @@ class PlannerThread:
             except Empty:
                 break
             self.skipped += following is not None
-            newest = following
+            newest = following if following is None else (following[0], [*newest[1], *following[1]])
         return newest
 
 
@@ -205,7 +230,7 @@ def _planner(scenario: Scenario, session: Session) -> Iterator[AnyPlanner]:
 
 
 @contextmanager
-def _ahead_of_others() -> Iterator[bool]:
+def ahead_of_others() -> Iterator[bool]:
     """Real-time priority for this thread, if the system grants it; gives whether it did.
 
     Where every core has work, a thread like any other waits for its turn for several milliseconds, now and then.

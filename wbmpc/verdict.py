@@ -14,6 +14,7 @@ import numpy as np
 from wbmpc.checks.result import CheckResult
 from wbmpc.recorder import Recorder
 from wbmpc.signals import SolveStatus, StageReport, Vector
+from wbmpc.triage.causes import Triage
 from wbmpc.versions import versions
 
 
@@ -28,6 +29,8 @@ class Verdict:
     solver: Mapping[str, Mapping[str, float]]
     timing: Mapping[str, float]  # wall times: LoopTiming.summary
     state_sha256: str
+    triage: Triage | None = None  # why it failed; None when it passed
+    golden: Mapping[str, Any] | None = None  # GoldenResult.as_dict; None when it was compared with none
     versions: Mapping[str, str] = field(default_factory=versions)
 
     @property
@@ -52,6 +55,8 @@ class Verdict:
             "seed": self.seed,
             "passed": self.passed,
             "checks": [asdict(check) for check in self.checks],
+            "triage": None if self.triage is None else self.triage.as_dict(),
+            "golden": None if self.golden is None else dict(self.golden),
             "metrics": dict(self.metrics),
             "solver": {stage: dict(row) for stage, row in self.solver.items()},
             "timing": dict(self.timing),

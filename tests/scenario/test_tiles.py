@@ -47,7 +47,7 @@ def tops_of(scenario: Scenario) -> dict[str, float]:
 
 
 @shared
-@given(seed=seeds, columns=st.integers(1, 7), rows=st.integers(1, 7), low=st.floats(1e-3, 0.1), more=st.floats(0, 0.1))
+@given(seed=seeds, columns=st.integers(1, 7), rows=st.integers(1, 7), low=st.floats(1e-3, 0.09), more=st.floats(0, 0.1))
 def test_heights_are_within_their_bounds_and_the_seeds_own(tmp_path, seed, columns, rows, low, more) -> None:
     field = FIELD | {"count": [columns, rows], "lowest": low, "highest": low + more}
     scenario = scenario_of(tmp_path, seed=seed, world__tiles=field)

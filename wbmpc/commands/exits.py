@@ -8,6 +8,7 @@ from collections.abc import Callable
 from enum import IntEnum
 from pathlib import Path
 
+from wbmpc.commands.annotations import annotations_of_problems, announce
 from wbmpc.errors import ScenarioError, WbmpcError
 
 
@@ -51,7 +52,7 @@ def guarded(work: Callable[[], ExitCode], *, traceback_path: Path, debug: bool) 
 
 
 def say_bad_input(error: WbmpcError) -> None:
-    """The error's own lines; below each problem of a scenario file, the line that it points at."""
+    """The error's own lines; below each problem of a scenario file, the line that it points at; in CI, annotations."""
     if not isinstance(error, ScenarioError):
         say(str(error))
         return
@@ -59,6 +60,7 @@ def say_bad_input(error: WbmpcError) -> None:
         say(str(problem))
         if problem.excerpt:
             say(problem.excerpt)
+    announce(annotations_of_problems(error))
 
 
 def report_internal_error(error: Exception, traceback_path: Path, *, debug: bool) -> None:

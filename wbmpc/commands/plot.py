@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import wbmpc.render as pictures  # first of all: it chooses MuJoCo's off-screen OpenGL before mujoco is imported
@@ -11,7 +11,7 @@ from wbmpc.commands.exits import ExitCode
 from wbmpc.errors import WbmpcError
 from wbmpc.figures.figure import FORMATS, figure_of, save_figure
 from wbmpc.figures.moments import key_moments
-from wbmpc.figures.strip import best_azimuth, save_strip
+from wbmpc.figures.strip import picture_of, save_strip
 from wbmpc.figures.trace import trace_of
 from wbmpc.rerun_sink.reading import Recording
 
@@ -56,12 +56,7 @@ def _plot(path: Path, target: Path, suffix: str, options: PlotOptions) -> list[P
     if options.frames == 0:
         return [figure]
     moments = key_moments(footage, trace, options.frames)
-    camera = pictures.Camera(distance=options.distance, follow=True)
-    azimuth = options.azimuth
-    if azimuth is None:
-        azimuth = best_azimuth(footage, trace, moments, camera)
-    width, height = options.size
+    picture = picture_of(footage, trace, moments, size=options.size, distance=options.distance, azimuth=options.azimuth)
     strip = target.with_name(f"{target.name}_strip{suffix if suffix in pictures.FORMATS else '.webp'}")
-    picture = pictures.Picture(width=width, height=height, camera=replace(camera, azimuth=azimuth))
     save_strip(footage, moments, strip, picture)
     return [figure, strip]

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pydantic import JsonValue
 
+from wbmpc.commands.ci import tell_ci
 from wbmpc.commands.exits import ExitCode, say
 from wbmpc.commands.one_run import Job, Outcome, broken, carry_out
 from wbmpc.commands.progress import counted, simulated_time
 from wbmpc.commands.summary import print_runs
-from wbmpc.commands.tables import print_checks, timing_line
+from wbmpc.commands.tables import cause_lines, print_checks, timing_line
 from wbmpc.errors import WbmpcError
+from wbmpc.golden import Golden, read_golden
 from wbmpc.junit import write_junit
 from wbmpc.pool import Died, available_cores, finished
-from wbmpc.scenario import counterfactual, load_scenario
+from wbmpc.scenario import Scenario, counterfactual, load_scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,10 @@ class RunOptions:
     counterfactuals: bool
     jobs: int | None  # parallel processes; None: one per core, one for a real-time run
     debug: bool
+    golden: Path | None = None  # folder of the golden results to compare with
+    write_golden: Path | None = None  # folder of those to make
+    view: bool = False  # open a rerun viewer and show the runs in it
+    view_at: str | None = None  # address of one that is open
 
 
 def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
@@ -39,8 +45,8 @@ def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
 
     Raises:
         ScenarioError: a scenario or an override is not valid.
-        WbmpcError: two scenarios would write the same files, the output folder cannot be made, or real-time runs were
-            asked for in parallel.
+        WbmpcError: two scenarios would write the same files, a golden result is missing or not one, an output folder
+            cannot be made, real-time runs were asked for in parallel, or there is no viewer where one was asked for.
     """
     if options.realtime and (options.jobs or 1) > 1:
         raise WbmpcError(f"--jobs {options.jobs}: real-time runs share no cores, run them one at a time")
@@ -50,6 +56,10 @@ def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
         if names.count(name) > 1:
             raise WbmpcError(f"two scenarios are named {name!r}: their results would overwrite each other")
     make_folder(options.out)
+    if options.write_golden is not None:
+        make_folder(options.write_golden, "--write-golden")
+    if viewer := _viewer(options):
+        jobs = [replace(job, viewer=viewer) for job in jobs]
     for job in jobs:
         job.remove_files()
     outcomes: dict[int, Outcome] = {}
@@ -65,6 +75,7 @@ def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
     except KeyboardInterrupt:
         interrupted = True
     _report([(jobs[k], outcomes[k]) for k in sorted(outcomes)], single=len(jobs) == 1)
+    tell_ci([(jobs[k], outcomes[k]) for k in sorted(outcomes)])
     if interrupted:
         say(f"interrupted: {len(outcomes)} of {len(jobs)} runs finished, their results are in {options.out}")
         return ExitCode.INTERRUPTED
@@ -76,20 +87,47 @@ def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
 def jobs_of(path: Path, options: RunOptions) -> list[Job]:
     """The run of one scenario file, then those of its counterfactuals when asked for."""
     scenario = load_scenario(path, options.overrides, options.seed)
-    rest = (options.out, options.record, options.realtime)
-    jobs = [Job(scenario, "", None, *rest)]
+    rest = (options.out, options.record, options.realtime, options.overrides, options.seed)
+    golden = _golden(scenario, options.golden), _golden_file(scenario, options.write_golden)
+    jobs = [Job(scenario, "", None, *rest, *golden)]
     if options.counterfactuals:
         declared = scenario.counterfactuals.items()
         jobs += [Job(counterfactual(scenario, name), name, change, *rest) for name, change in declared]
     return jobs
 
 
-def make_folder(folder: Path) -> None:
-    """Make the output folder. Raises WbmpcError when that is impossible."""
+def _viewer(options: RunOptions) -> str | None:
+    """URL of the viewer that was asked for, which listens by now."""
+    if options.view and options.view_at is not None:
+        raise WbmpcError("--view opens a viewer, --view-at takes one that is open: give one of them")
+    if not options.view and options.view_at is None:
+        return None
+    from wbmpc.rerun_sink.live import new_viewer, viewer_at
+
+    return new_viewer() if options.view_at is None else viewer_at(options.view_at)
+
+
+def _golden(scenario: Scenario, folder: Path | None) -> tuple[Path, Golden] | None:
+    """A scenario's golden result, known before anything runs."""
+    if folder is None:
+        return None
+    path = folder / f"{scenario.name}.json"
+    golden = read_golden(path)
+    if golden.seed != scenario.seed:
+        raise WbmpcError(f"{path}: of seed {golden.seed}, this run has seed {scenario.seed}")
+    return path, golden
+
+
+def _golden_file(scenario: Scenario, folder: Path | None) -> Path | None:
+    return None if folder is None else folder / f"{scenario.name}.json"
+
+
+def make_folder(folder: Path, option: str = "--out") -> None:
+    """Make an output folder. Raises WbmpcError when that is impossible."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise WbmpcError(f"--out {folder}: {error.strerror}") from None
+        raise WbmpcError(f"{option} {folder}: {error.strerror}") from None
 
 
 def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, Outcome], None, None]:
@@ -128,5 +166,9 @@ def _report(ended: Sequence[tuple[Job, Outcome]], *, single: bool) -> None:
             print_checks(title, outcome.checks)
         if job.realtime and outcome.timing:
             print(timing_line(job.name, outcome.timing), flush=True)
-        if single or outcome.code is not ExitCode.PASSED:
+        wrong = outcome.code is not ExitCode.PASSED
+        if single or wrong:
             print(outcome.line, flush=True)
+        if wrong and outcome.triage:
+            for line in cause_lines(outcome.triage, job.recording):
+                print(f"  {line}", flush=True)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +16,7 @@ from scipy.stats import binomtest
 from wbmpc.checks.settings import UniversalSettings
 from wbmpc.commands.exits import ExitCode, say
 from wbmpc.commands.progress import counted
+from wbmpc.commands.reproduce import run_command
 from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import console, number
 from wbmpc.errors import WbmpcError
@@ -98,14 +97,6 @@ def summary(name: str, seed: int, rows: Sequence[Mapping[str, Any]], header: Map
     }
 
 
-def reproduce(path: Path, overrides: Mapping[str, JsonValue], row: Mapping[str, Any]) -> str:
-    """The shell command that makes the run of one draw again."""
-    words = ["wbmpc", "run", str(path), "--seed", str(row["seed"])]
-    for key, value in {**overrides, **row["set"]}.items():
-        words += ["--set", f"{key}={json.dumps(value)}"]
-    return shlex.join(words)
-
-
 def _word(row: Mapping[str, Any]) -> str:
     return f"draw {row['draw']} {'PASS' if row['passed'] else 'FAIL'}"
 
@@ -130,7 +121,7 @@ def _print(path: Path, options: SweepOptions, document: Mapping[str, Any]) -> No
     console().print(table)
     print("again:")
     for row in worst:
-        print(f"  {reproduce(path, options.overrides, row)}")
+        print(f"  {run_command(path, seed=row['seed'], changes={**options.overrides, **row['set']})}")
     low, high = document["interval"]["low"], document["interval"]["high"]
     rate = f"{document['passed']} of {document['draws']} draws passed: {document['pass_rate']:.1%}"
     verdict = "PASS" if document["pass_rate"] >= options.min_rate else "FAIL"

@@ -27,17 +27,20 @@ class Document:
     key_marks: dict[KeyPath, Mark] = field(default_factory=dict)
     value_marks: dict[KeyPath, Mark] = field(default_factory=dict)
 
-    def problem(self, path: KeyPath, message: str, *, at_key: bool = False) -> Problem:
-        """A problem at `path`, placed at its key or its value, or at the nearest ancestor that the file has."""
-        mark = None
+    def mark(self, path: KeyPath, *, at_key: bool = False) -> Mark:
+        """Where `path` stands: its key or its value, or the nearest ancestor that the file has."""
         for end in range(len(path), -1, -1):
             first, second = (self.key_marks, self.value_marks) if at_key else (self.value_marks, self.key_marks)
             mark = first.get(path[:end]) or second.get(path[:end])
             if mark:
-                break
+                return mark
             at_key = True  # the part itself is absent: point at the name of the block where it belongs
+        return Mark(0, 0)
+
+    def problem(self, path: KeyPath, message: str, *, at_key: bool = False) -> Problem:
+        """A problem at `path`, placed as `mark` says."""
         dotted = dotted_path(path)
-        return self.problem_at(mark or Mark(0, 0), f"{dotted}: {message}" if dotted else message)
+        return self.problem_at(self.mark(path, at_key=at_key), f"{dotted}: {message}" if dotted else message)
 
     def problem_at(self, mark: Mark, message: str) -> Problem:
         """A problem at a position in the text."""

@@ -13,6 +13,7 @@ class Stream(IntEnum):
     SENSOR_NOISE = 1
     TILES = 2
     GROUND_ERROR = 3
+    OPERATOR = 4
 
 
 def generator(seed: int, stream: Stream) -> np.random.Generator:
