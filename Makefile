@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 PEERS := .venv-peers
+DOCS := .venv-docs
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.synced
 OUT ?= out
@@ -12,7 +13,7 @@ TEST_ARGS ?=
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test lint format types scenarios pictures bench peers lock setup clean
+.PHONY: run test lint format types scenarios pictures viewer report report-pictures reference docs docs-serve bench peers lock setup clean
 .DELETE_ON_ERROR:
 
 run: setup
@@ -33,13 +34,40 @@ types: setup
 	$(BIN)/mypy
 
 scenarios: setup
-	$(BIN)/wbmpc run scenarios/*.yaml --counterfactuals --out $(OUT)
+	$(BIN)/wbmpc run scenarios/*.yaml --counterfactuals --golden scenarios/golden --out $(OUT)
 
 # docs/scenarios.md anew, pictures and all.
 pictures: setup
 	$(BIN)/wbmpc run scenarios/*.yaml --out $(OUT)
 	$(BIN)/wbmpc plot $(patsubst scenarios/%.yaml,$(OUT)/%.rrd,$(wildcard scenarios/*.yaml)) --out docs/pictures
 	$(BIN)/python docs/scenarios_page.py
+
+# The pictures of docs/recordings.md, by the commands that it shows; needs Vulkan (mesa-vulkan-drivers and libvulkan1).
+viewer: setup
+	$(BIN)/wbmpc run scenarios/reach.yaml scenarios/hole.yaml --out out
+	grep '^wbmpc screenshot' docs/recordings.md | sed 's|^|$(BIN)/|' | sh -e
+
+# One page about everything in $(OUT).
+report: setup
+	$(BIN)/wbmpc report $(OUT)
+
+# The pictures of docs/report.md: a page in a real browser, light and dark; needs Chromium.
+report-pictures: setup
+	$(BIN)/wbmpc run scenarios/reach.yaml --counterfactuals --out $(OUT)/report
+	$(BIN)/wbmpc report $(OUT)/report --title "Reaching over a table"
+	$(BIN)/python docs/report_pictures.py $(OUT)/report/report.html
+
+# docs/reference/ anew, after a change of the schema, a check or the command line.
+reference: setup
+	$(BIN)/python -m docs.tools.reference
+
+# The documentation site into site/: any warning, dead link or page without a place in the navigation is an error.
+docs: $(DOCS)/.synced
+	$(DOCS)/bin/python -m docs.tools.build
+
+# The same at localhost:8000, rendered anew when a page changes.
+docs-serve: $(DOCS)/.synced
+	$(DOCS)/bin/python -m docs.tools.build --serve
 
 # All benchmarks, peers included, into docs/benchmarks.md, docs/benchmarks_stage3.md and docs/profile.md, about half an
 # hour on a machine with nothing else to do; one of the first file's: PARTS=tracker.
@@ -73,6 +101,14 @@ $(PEERS)/.synced: requirements/peers.txt $(STAMP)
 	@VIRTUAL_ENV=$(CURDIR)/$(PEERS) $(BIN)/uv pip sync --quiet --require-hashes --only-binary :all: requirements/peers.txt
 	@touch $@
 
+# The renderer in an environment of its own, so that its packages are no concern of the simulator's: it reads the
+# sources and imports nothing of them.
+$(DOCS)/.synced: requirements/docs.txt $(STAMP)
+	@echo "setting up $(DOCS) (once)"
+	@test -x $(DOCS)/bin/python || $(BIN)/uv venv --quiet --python $(BIN)/python $(DOCS)
+	@VIRTUAL_ENV=$(CURDIR)/$(DOCS) $(BIN)/uv pip sync --quiet --require-hashes requirements/docs.txt
+	@touch $@
+
 UV_LOCK = $(BIN)/uv pip compile --quiet $(UPGRADE) --generate-hashes --no-emit-index-url \
 	--python-version 3.11 --custom-compile-command "make lock"
 
@@ -80,8 +116,9 @@ UV_LOCK = $(BIN)/uv pip compile --quiet $(UPGRADE) --generate-hashes --no-emit-i
 lock: setup
 	$(UV_LOCK) pyproject.toml --output-file requirements/run.txt
 	$(UV_LOCK) pyproject.toml --group dev --output-file requirements/dev.txt
+	$(UV_LOCK) --group docs --output-file requirements/docs.txt
 	$(UV_LOCK) requirements/peers.in --output-file requirements/peers.txt
 
 clean:
-	rm -rf $(OUT) $(VENV) $(PEERS) .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(OUT) $(VENV) $(PEERS) $(DOCS) site build .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -28,8 +28,9 @@ SCENARIO, SECONDS = "reach", 60.0
 SETTLED = 0.25  # share of a run after which its growth is fitted: libraries are loaded, tables have grown
 MEGABYTE = 1e6
 NOTE = f"""`{SCENARIO}` prolonged to {SECONDS:g} simulated seconds; it stands after the reach. Growth is a line fitted
-to the resident memory, looked at twice a simulated second, after the first quarter. The recorder keeps every tick of a
-run in memory, because checks and recordings read it: its columns are what a second must add."""
+to the resident memory, looked at twice a simulated second, after the first quarter. The recorder keeps what
+happened at every tick of a run in memory, because checks read it, and the controller's signals as often as the
+recording shows them: these columns, and the contacts, are what a second must add."""
 
 
 def resident() -> float:
