@@ -6,7 +6,7 @@ python -m benchmarks realtime
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,7 +23,7 @@ from wbmpc.rerun_sink import RerunSink
 from wbmpc.robot import Robot
 from wbmpc.scenario import load_scenario, robot_path
 from wbmpc.session import run_scenario
-from wbmpc.signals import RobotState
+from wbmpc.signals import RobotState, TargetMove
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ROUNDS = 3  # of every kind of run, in turn
@@ -38,7 +38,7 @@ machine and the tick itself miss."""
 def idle_planner() -> AbstractContextManager[None]:
     """Inside, no snapshot reaches the planner's thread: the loop follows its first plan."""
 
-    def ignore(thread: PlannerThread, snapshot: RobotState) -> None:
+    def ignore(thread: PlannerThread, snapshot: RobotState, orders: Sequence[TargetMove] = ()) -> None:
         """Nothing is asked for."""
 
     return replaced(PlannerThread, "request", lambda request: ignore)
