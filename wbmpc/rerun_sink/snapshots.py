@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,9 +32,9 @@ class RecordedPlan:
 
 def digest(report: PlanReport) -> str:
     """Of every bit of a plan's report but its wall times: equal for equal plans."""
-    content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
-    _feed(content, report)
-    return content.hexdigest()
+    parts: list[bytes] = []
+    _gather(report, parts)
+    return hashlib.blake2b(b"".join(parts), digest_size=_DIGEST_BYTES).hexdigest()
 
 
 def write_snapshots(stream: Stream, recorder: Recorder, since: int) -> None:
@@ -42,9 +43,9 @@ def write_snapshots(stream: Stream, recorder: Recorder, since: int) -> None:
     if not planned:
         return
     time = np.array([state.time for state, _ in planned])
-    columns = {name: [np.ravel(getattr(state, name)) for state, _ in planned] for name in _STATE}
+    columns = {name: np.array([getattr(state, name) for state, _ in planned]) for name in _STATE}
     digests = [digest(report) for _, report in planned]
-    stream.values(SNAPSHOTS, time, snapshot_time=list(time), digest=digests, **columns)
+    stream.values(SNAPSHOTS, time, snapshot_time=time, digest=digests, **columns)
 
 
 def recorded_plans(recording: Recording) -> Sequence[RecordedPlan]:
@@ -68,20 +69,24 @@ def recorded_plans(recording: Recording) -> Sequence[RecordedPlan]:
     ]
 
 
-def _feed(content: Any, value: Any) -> None:
-    if is_dataclass(value):
-        for field in fields(value):
-            if field.name not in _WALL_TIMES:
-                _feed(content, getattr(value, field.name))
+def _gather(value: Any, parts: list[bytes]) -> None:
+    """Append what tells `value` from every other, type by type; floats to the bit."""
+    if isinstance(value, np.ndarray):
+        parts += (str(value.shape).encode(), value.tobytes())
+    elif (names := _fields_of(type(value))) is not None:
+        for name in names:
+            _gather(getattr(value, name), parts)
     elif isinstance(value, tuple):
-        content.update(f"({len(value)}".encode())
+        parts.append(b"(%d" % len(value))
         for item in value:
-            _feed(content, item)
-    elif value is None:
-        content.update(b"none")
-    elif isinstance(value, str):
-        content.update(f"{len(value)}:{value}".encode())
-    else:
-        array = np.asarray(value)
-        content.update(str(array.shape).encode())
-        content.update(np.ascontiguousarray(array).tobytes())
+            _gather(item, parts)
+    elif isinstance(value, int):  # an enum's number, not its name
+        parts.append(b"%d;" % value)
+    else:  # a number's shortest text that reads back as the same bits; a text in quotes
+        parts.append(repr(value).encode())
+
+
+@cache
+def _fields_of(kind: type) -> tuple[str, ...] | None:
+    """Fields of a dataclass that a plan is told by; None: `kind` is none."""
+    return tuple(f.name for f in fields(kind) if f.name not in _WALL_TIMES) if is_dataclass(kind) else None

@@ -155,14 +155,19 @@ class Stream:
         column = _STRIP.column(points, _offsets(there), _offsets(lengths[there]))
         self.columns(path, time, [column])
 
-    def values(self, path: str, time: NDArray[np.float64], **values: Sequence[Any]) -> None:
+    def values(self, path: str, time: NDArray[np.float64], **values: Sequence[Any] | NDArray[Any]) -> None:
         """Values that no view draws, of any type: one, or an array of them, of each name at each time."""
-        columns: list[Any] = []
+        columns = []
         for name, rows in values.items():
-            flat = np.concatenate([np.ravel(row) for row in rows]) if any(map(np.ndim, rows)) else np.asarray(rows)
+            if isinstance(rows, np.ndarray):
+                flat, offsets = rows.ravel(), _even(len(rows), rows[0].size if len(rows) else 0)
+            elif any(map(np.ndim, rows)):
+                flat, offsets = np.concatenate([np.ravel(row) for row in rows]), _offsets([np.size(row) for row in rows])
+            else:
+                flat, offsets = np.asarray(rows), _even(len(rows), 1)
             # Named: the reader tells an archetype's components from timelines by it.
-            made = rr.DynamicArchetype.columns(archetype=_VALUES, components={name: flat})
-            columns += made.partition([np.size(row) for row in rows])
+            descriptor = rr.ComponentDescriptor(component=name).with_builtin_archetype(_VALUES)
+            columns.append(Column(descriptor, pa.ListArray.from_arrays(offsets, pa.array(flat))))
         self.columns(path, time, columns)
 
     def states(self, path: str, time: NDArray[np.float64], states: Sequence[str]) -> None:
