@@ -5,7 +5,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
+from functools import cache, lru_cache
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ SNAPSHOTS = "/planner/snapshots"
 _STATE = ("q", "v", "sole_wrench_in_world", "palm_force_in_world", "mass_scale")
 _WALL_TIMES = {"solve_time", "plan_time"}
 _DIGEST_BYTES = 16
+_BITS = Struct("=d").pack
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,18 +74,24 @@ def recorded_plans(recording: Recording) -> Sequence[RecordedPlan]:
 def _gather(value: Any, parts: list[bytes]) -> None:
     """Append what tells `value` from every other, type by type; floats to the bit."""
     if isinstance(value, np.ndarray):
-        parts += (str(value.shape).encode(), value.tobytes())
+        parts += (_text(value.shape), value.tobytes())
+    elif isinstance(value, float):
+        parts.append(_BITS(value))
     elif (names := _fields_of(type(value))) is not None:
         for name in names:
             _gather(getattr(value, name), parts)
     elif isinstance(value, tuple):
-        parts.append(b"(%d" % len(value))
+        parts.append(_text(len(value)))
         for item in value:
             _gather(item, parts)
-    elif isinstance(value, int):  # an enum's number, not its name
-        parts.append(b"%d;" % value)
-    else:  # a number's shortest text that reads back as the same bits; a text in quotes
-        parts.append(repr(value).encode())
+    else:
+        parts.append(_text(value))
+
+
+@lru_cache(maxsize=256, typed=True)  # 1, True and an enum's member are not the same
+def _text(value: object) -> bytes:
+    """Of a text, a small number, a shape, or None: few are different, and they come back in every plan."""
+    return repr(value).encode()
 
 
 @cache

@@ -162,7 +162,7 @@ class Stream:
             if isinstance(rows, np.ndarray):
                 flat, offsets = rows.ravel(), _even(len(rows), rows[0].size if len(rows) else 0)
             elif any(map(np.ndim, rows)):
-                flat, offsets = np.concatenate([np.ravel(row) for row in rows]), _offsets([np.size(row) for row in rows])
+                flat, offsets = np.concatenate([np.ravel(row) for row in rows]), _offsets(list(map(np.size, rows)))
             else:
                 flat, offsets = np.asarray(rows), _even(len(rows), 1)
             # Named: the reader tells an archetype's components from timelines by it.
