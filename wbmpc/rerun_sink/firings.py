@@ -54,8 +54,9 @@ class FiringLog:
     def write(self, plans: Sequence[PlanReport]) -> None:
         """Send what fired in the plans, in order, and take from the 3D view what is over."""
         fired = [(plan.time, plan.firing) for plan in plans if plan.firing]
-        self._write_texts([plan for plan in plans if plan.firing])
-        self._write_numbers(fired)
+        if fired:
+            self._write_texts([plan for plan in plans if plan.firing])
+            self._write_numbers(fired)
         scenes: list[tuple[float, Firing | None]] = []
         for plan in plans:
             if plan.firing:
@@ -67,6 +68,8 @@ class FiringLog:
         if not self._begun and (not scenes or scenes[0][0] > plans[0].time):
             scenes.insert(0, (plans[0].time, None))
         self._begun = True
+        if not scenes:  # nor did anything fire
+            return
         time = np.array([t for t, _ in scenes])
         self._stream.states(_LANE, time, [_headline(firing) for _, firing in scenes])
         self._draw(time, [firing for _, firing in scenes])
@@ -86,8 +89,6 @@ class FiringLog:
 
     def _write_numbers(self, fired: Sequence[tuple[float, Firing]]) -> None:
         """The same as numbers, for those who query the file: k knots and c candidates a row, forces (c k 3,)."""
-        if not fired:
-            return
         time, firings = np.array([t for t, _ in fired]), [firing for _, firing in fired]
 
         def of_all(value: Callable[[CandidateReport], Any]) -> list[Any]:

@@ -77,7 +77,7 @@ def _gather(value: Any, parts: list[bytes]) -> None:
         parts += (_text(value.shape), value.tobytes())
     elif isinstance(value, float):
         parts.append(_BITS(value))
-    elif (names := _fields_of(type(value))) is not None:
+    elif (names := _fields_of(value.__class__)) is not None:
         for name in names:
             _gather(getattr(value, name), parts)
     elif isinstance(value, tuple):

@@ -174,17 +174,16 @@ class Stream:
         """A lane of a state timeline: only the changes are written."""
         last = self._last_state.get(path)
         changes = [i for i, state in enumerate(states) if state != (states[i - 1] if i else last)]
-        if states:
+        if changes:
             self._last_state[path] = states[-1]
-        self.columns(
-            path, np.asarray(time)[changes], rr.StateChange.columns(state=[drawable(states[i]) for i in changes])
-        )
+            column = rr.StateChange.columns(state=[drawable(states[i]) for i in changes])
+            self.columns(path, np.asarray(time)[changes], column)
 
     def texts(self, path: str, time: NDArray[np.float64], texts: Sequence[str], level: str = "INFO") -> None:
         """Lines of the text log."""
-        self.columns(
-            path, time, rr.TextLog.columns(text=[drawable(text) for text in texts], level=[level] * len(texts))
-        )
+        if texts:
+            column = rr.TextLog.columns(text=[drawable(text) for text in texts], level=[level] * len(texts))
+            self.columns(path, time, column)
 
 
 def worst_since_last(column: NDArray[np.float64], rows: NDArray[np.integer], stride: int) -> NDArray[np.float64]:
