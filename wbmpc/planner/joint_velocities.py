@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
 from wbmpc.jit import kernel
-from wbmpc.planner.box_kernel import solve_box
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
-from wbmpc.signals import SolveStatus, Vector
+from wbmpc.qp.cholesky import factor, forward
+from wbmpc.signals import Vector
 
 FOOT_ROWS = 12  # two soles, six rows each
+AT_BOUND = 1e-9  # [m/s, rad/s] from a bound, a velocity is held by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,16 +65,11 @@ class JointVelocities:
         """`velocities`: nv."""
         self._settings = settings
         self.problem = QuadraticProgram(velocities, 0)
-        self._workspace, self._guesses = make_workspace(backend, self.problem), backend == "daqp"
+        self._workspace = make_workspace(backend, self.problem)
         self._tasks: VelocityTasks | None = None
         self._fresh = True
-        self._held = np.zeros(velocities, dtype=np.int64)  # at the last optimum: 1 at its upper bound, -1 at its lower
         self._base_gradient = np.zeros(velocities)
         self.cost: VelocityCost | None = None  # as last solved for these tasks
-        nothing, matrix = np.zeros(velocities), np.eye(velocities)
-        _cost(
-            nothing, np.zeros(2), np.zeros((3, velocities)), matrix, nothing, nothing, 0.0
-        )  # compiled now: rarely used
 
     def take(self, tasks: VelocityTasks) -> None:
         """Turn to `tasks`; the same object again changes nothing."""
@@ -95,21 +90,10 @@ class JointVelocities:
         qp.x_lower[:], qp.x_upper[:] = tasks.lower, tasks.upper
 
     def solve(self, velocity: Vector) -> tuple[QpSolution, VelocityCost | None]:
-        """q̇ (nv,) for the CoM velocity `velocity` (2,) [m/s], and V there; None when the solve failed.
-
-        The joints held at their bounds are few and mostly those of the last plan; where that guess does not lead to the
-        optimum the backend is asked. Any other backend than the default one is asked at once.
-        """
+        """q̇ (nv,) for the CoM velocity `velocity` (2,) [m/s], and V there; None when the solve failed."""
         assert self._tasks is not None
-        start = perf_counter()
         qp, weight, jacobian = self.problem, self._settings.com_velocity_cost, self._tasks.com_jacobian
         qp.gradient[:] = self._base_gradient - weight * (velocity @ jacobian[:2])
-        if self._guesses:
-            box = (qp.hessian, qp.gradient, qp.x_lower, qp.x_upper)
-            rounds, x, slope, curvature = solve_box(*box, jacobian, velocity, weight, self._held)
-            if rounds:
-                self.cost = VelocityCost(velocity, slope, curvature)
-                return QpSolution(x, SolveStatus.SOLVED, rounds, perf_counter() - start), self.cost
         solution = self._workspace.solve(matrices_changed=self._fresh)
         self._fresh, self.cost = not solution.solved, None
         if solution.solved:
@@ -172,22 +156,27 @@ def _cost(
 
     ∇V = w (v − J q̇),   ∇²V = w (1 − w J_f H_ff⁻¹ J_fᵀ)   over the joints f that are free.
     """
-    free = np.flatnonzero((x > lower + 1e-9) & (x < upper - 1e-9))
-    H, J = np.empty((len(free), len(free))), np.empty((len(free), 2))
-    for i in range(len(free)):
-        J[i, 0], J[i, 1] = jacobian[0, free[i]], jacobian[1, free[i]]
-        for j in range(len(free)):
-            H[i, j] = hessian[free[i], free[j]]
-    slope, curvature = np.empty(2), np.zeros((2, 2))
-    follows = np.linalg.solve(H, J) if len(free) else J
-    for a in range(2):
-        slope[a] = velocity[a]
-        for i in range(len(x)):
+    count, free = 0, np.empty(len(x), np.int64)
+    slope, curvature = velocity.copy(), np.zeros((2, 2))
+    for i in range(len(x)):
+        for a in range(2):
             slope[a] -= jacobian[a, i] * x[i]
+        if lower[i] + AT_BOUND < x[i] < upper[i] - AT_BOUND:
+            free[count] = i
+            count += 1
+    U, follows = np.empty((count, count)), np.empty((2, count))
+    for f in range(count):
+        for a in range(2):
+            follows[a, f] = jacobian[a, free[f]]
+        for g in range(f, count):
+            U[f, g] = hessian[free[f], free[g]]
+    factor(U, count)
+    for a in range(2):
+        forward(U, follows[a], count)
+    for a in range(2):
         slope[a] *= weight
         curvature[a, a] = weight
         for b in range(2):
-            for i in range(len(free)):
-                curvature[a, b] -= weight * weight * J[i, a] * follows[i, b]
-    curvature[0, 1] = curvature[1, 0] = 0.5 * (curvature[0, 1] + curvature[1, 0])
+            for f in range(count):
+                curvature[a, b] -= weight * weight * follows[a, f] * follows[b, f]
     return slope, curvature
