@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from settled import settled
 
 from wbmpc.kinematics import Kinematics
 from wbmpc.robot import Robot
@@ -265,15 +266,7 @@ def test_home_stands(robot: Robot, home: mujoco.MjData) -> None:
 
 def test_home_holds_on_a_floor() -> None:
     """With the joints held stiffly at `home` on a floor, the robot stays; the soles, and nothing else, carry it."""
-    spec = mujoco.MjSpec.from_file(str(MODEL))
-    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 0.1])
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    target = data.qpos[7:].copy()
-    for _ in range(1000):
-        data.ctrl[:] = 30 * (target - data.qpos[7:]) - 0.5 * data.qvel[6:]
-        mujoco.mj_step(model, data)
+    model, data = settled(MODEL, ticks=1000, stiffness=30.0, damping=0.5)
     assert data.body("torso").xmat[8] > 0.999
     touching = {name for pair in data.contact.geom for name in (model.geom(int(i)).name for i in pair)}
     assert touching == {"floor", "left_foot", "right_foot"}

@@ -8,9 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 import pytest
+from settled import settled
 
 from wbmpc.doctor.check import Answer, Check, Finding, Missing, Status, examine
 from wbmpc.doctor.robot import reach
@@ -305,15 +305,7 @@ def test_holding_torques_are_those_of_a_robot_that_stands() -> None:
     """Against a simulation: joints held stiffly on a floor until all is at rest."""
     from wbmpc.doctor.robot.standing import holding_torques
 
-    spec = mujoco.MjSpec.from_file(str(MODEL))
-    spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 0.1])
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_resetDataKeyframe(model, data, model.key("home").id)
-    target = data.qpos[7:].copy()
-    for _ in range(2000):
-        data.ctrl[:] = 60 * (target - data.qpos[7:]) - 1.0 * data.qvel[6:]
-        mujoco.mj_step(model, data)
+    model, data = settled(MODEL, ticks=2000, stiffness=60.0, damping=1.0)
     knee = model.joint("left_knee").id
     share = abs(data.actuator_force[knee - 1]) / model.jnt_actfrcrange[knee, 1]
     words = holding_torques(RobotFile(MODEL)).found
