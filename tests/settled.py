@@ -1,4 +1,4 @@
-"""A robot at home on a floor, its joints held stiffly until it is at rest: plain PD servos, nothing of the controller."""
+"""A robot at home on a floor, its joints held stiffly until it rests: plain PD servos, nothing of the controller."""
 
 from __future__ import annotations
 

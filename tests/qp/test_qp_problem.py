@@ -8,6 +8,7 @@ from random_problems import random_problem
 
 from wbmpc.errors import WbmpcError
 from wbmpc.qp import QuadraticProgram, load_instance, save_instance
+from wbmpc.qp.verdicts import closes_duality_gap
 
 
 def test_arrays_cannot_be_rebound_but_can_be_written():
@@ -60,3 +61,20 @@ def test_files_that_are_no_instances_are_refused(tmp_path):
     np.savez(tmp_path / "shape.npz", matrix=np.zeros((1, 2)), soft_weight=np.zeros(1), binary=np.zeros(0), **arrays)
     with pytest.raises(WbmpcError, match="hessian has shape"):
         load_instance(tmp_path / "shape.npz")
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "closes"),
+    [
+        ([0.0, 2.0], True),  # the lower bound of x₁ is at 1: f = 1, gᵀx = 0, λᵀb = −2 on the side of its sign
+        ([0.0, 1.0], False),
+        ([-1.0, 2.0], False),  # x₀ has no lower bound; inf is no gap that closes
+        ([1.0, 2.0], False),
+    ],
+)
+def test_a_duality_gap_closes_at_the_optimum_only(multiplier: list[float], closes: bool) -> None:
+    """minimise x₀² + x₁² with x₁ >= 1, whose multiplier is −2."""
+    x, cost = np.array([0.0, 1.0]), 1.0
+    lower, upper = np.array([-np.inf, 1.0]), np.full(2, np.inf)
+    sign = np.array(multiplier) * [1.0, -1.0]
+    assert closes_duality_gap(x, cost, sign, np.zeros(2), lower, upper, 1e-6) is closes

@@ -1,4 +1,4 @@
-"""Numbers of the QP of the horizontal CoM motion, and what its solution says, in compiled loops.
+"""Numbers of the QP of the horizontal CoM motion, in compiled loops; what its solution says: horizontal_answer.py.
 
 Written a second time, readably and as one QP with the joint velocities, in tests/planner/joint_form.py.
 """
@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.jit import kernel
-from wbmpc.planner.support import MAX_EDGES
+from wbmpc.jit import kernel, short_kernel
 from wbmpc.signals import Vector
 
 
@@ -71,7 +70,7 @@ class Slots(NamedTuple):
     axes: NDArray[np.int64]
 
 
-@kernel
+@short_kernel
 def most_sides(edges: HalfPlanes) -> int:
     """How many sides the polygon with the most of them has; the rest of its rows are padding."""
     most = len(edges.rest_offsets)
@@ -81,20 +80,23 @@ def most_sides(edges: HalfPlanes) -> int:
 
 
 @kernel
-def free_motion(matrices: Matrices, state: Vector, a: Vector, b: Vector, offset: Vector) -> FreeMotion:
-    """From `state` (2, 3) with the ZMP's model a, b (N,), `offset` (N, 2)."""
+def look_ahead(
+    unmoved: FreeMotion, matrices: Matrices, state: Vector, a: Vector, b: Vector, offset: Vector, edges: HalfPlanes
+) -> int:
+    """Fill `unmoved`, from `state` (2, 3) with the ZMP's model a, b (N,), `offset` (N, 2); gives `most_sides`."""
     P_ps, P_vs, P_pu, P_au = matrices.P_ps, matrices.P_vs, matrices.P_pu, matrices.P_au
-    n = len(a)
-    free, free_velocity, free_zmp, P_zu = np.zeros((2, n)), np.zeros((2, n)), np.empty((n, 2)), np.empty((n, n))
-    for k in range(n):
+    free, free_velocity, free_zmp, P_zu = unmoved
+    for k in range(len(a)):
         for axis in range(2):
+            c = v = 0.0
             for i in range(3):
-                free[axis, k] += P_ps[k, i] * state[axis, i]
-                free_velocity[axis, k] += P_vs[k, i] * state[axis, i]
-            free_zmp[k, axis] = a[k] * free[axis, k] - b[k] * state[axis, 2] + offset[k, axis]
-        for j in range(n):
+                c += P_ps[k, i] * state[axis, i]
+                v += P_vs[k, i] * state[axis, i]
+            free[axis, k], free_velocity[axis, k] = c, v
+            free_zmp[k, axis] = a[k] * c - b[k] * state[axis, 2] + offset[k, axis]
+        for j in range(len(a)):
             P_zu[k, j] = a[k] * P_pu[k, j] - b[k] * P_au[k, j]
-    return FreeMotion(free, free_velocity, free_zmp, P_zu)
+    return most_sides(edges)
 
 
 @kernel
@@ -223,74 +225,3 @@ def write_rows(
         for k in range(n):
             lower[band + axis * n + k] = com_band[axis, k, 0] - free[axis, k]
             upper[band + axis * n + k] = com_band[axis, k, 1] - free[axis, k]
-
-
-@kernel
-def motion_of(
-    x: Vector, state: Vector, matrices: Matrices, unmoved: FreeMotion, footsteps: int, slots: Slots
-) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector]:
-    """Jerk, CoM, velocity, acceleration, ΔZ and ZMP of a solution, all (N, 2)."""
-    P_pu, P_vu, P_au = matrices.P_pu, matrices.P_vu, matrices.P_au
-    free, free_velocity, free_zmp, P_zu = unmoved
-    n = len(free_zmp)
-    jerk, com, velocity = np.empty((n, 2)), np.empty((n, 2)), np.empty((n, 2))
-    acceleration, delta_z, zmp = np.empty((n, 2)), np.zeros((n, 2)), np.empty((n, 2))
-    for i in range(len(slots.knots)):
-        if slots.knots[i] >= 0:
-            delta_z[slots.knots[i], slots.axes[i]] = x[2 * n + 2 * footsteps + i]
-    for k in range(n):
-        for axis in range(2):
-            jerk[k, axis] = x[axis * n + k]
-            c, v, z = free[axis, k], free_velocity[axis, k], free_zmp[k, axis] + delta_z[k, axis]
-            dv = state[axis, 2]
-            for j in range(k + 1):
-                u = x[axis * n + j]
-                c += P_pu[k, j] * u
-                v += P_vu[k, j] * u
-                dv += P_au[k, j] * u
-                z += P_zu[k, j] * u
-            com[k, axis], velocity[k, axis], acceleration[k, axis], zmp[k, axis] = c, v, dv, z
-    return jerk, com, velocity, acceleration, delta_z, zmp
-
-
-@kernel
-def worth_of_shifts(
-    com: Vector,
-    velocity: Vector,
-    delta_z: Vector,
-    zmp: Vector,
-    steps: Vector,
-    end: End,
-    edges: HalfPlanes,
-    zmp_cost: float,
-    rest_cost: float,
-) -> Vector:
-    """By how much a shift of the ZMP (N, 2) would make the soft rows' cost grow [cost / m].
-
-    The rows are soft with cost ½ w s², so their multipliers are w s. `steps` (F, 2): displacements of the footsteps.
-    """
-    normals, offsets, shift, rest_normals, rest_offsets, rest_shift = edges
-    n = len(zmp)
-    worth = np.zeros((n, 2))
-    z = np.empty(2)
-    for k in range(n):
-        for axis in range(2):
-            z[axis] = zmp[k, axis]
-            for f in range(len(steps)):
-                z[axis] -= shift[k, f] * steps[f, axis]
-        for e in range(MAX_EDGES):
-            beyond = normals[k, e, 0] * z[0] + normals[k, e, 1] * z[1] - offsets[k, e]
-            if beyond > 0.0:
-                for axis in range(2):
-                    worth[k, axis] += zmp_cost * beyond * normals[k, e, axis]
-    tau = np.sqrt(end.b / end.a)
-    for axis in range(2):
-        z[axis] = end.a * (com[n - 1, axis] + tau * velocity[n - 1, axis]) + end.offset[axis] + delta_z[n - 1, axis]
-        for f in range(len(steps)):
-            z[axis] -= rest_shift[f] * steps[f, axis]
-    for e in range(MAX_EDGES):
-        beyond = rest_normals[e, 0] * z[0] + rest_normals[e, 1] * z[1] - rest_offsets[e]
-        if beyond > 0.0:
-            for axis in range(2):
-                worth[n - 1, axis] += rest_cost * beyond * rest_normals[e, axis]
-    return worth

@@ -7,16 +7,15 @@ from itertools import product
 
 import numpy as np
 
+from wbmpc.planner.horizontal_answer import ask_for_shifts, read_motion
 from wbmpc.planner.horizontal_kernel import (
     Costs,
     End,
+    FreeMotion,
     HalfPlanes,
     Matrices,
     Slots,
-    free_motion,
-    most_sides,
-    motion_of,
-    worth_of_shifts,
+    look_ahead,
     write_costs,
     write_rows,
 )
@@ -32,8 +31,6 @@ LARGEST_SHIFT = 1.0  # [m] bound on |ΔZ|
 SIDES = (4, 6, MAX_EDGES)  # of the polygons: problems of three sizes
 NO_SLOTS = (Slots(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)), np.empty(0))
 ROUNDS = 20  # of asking for further shifts; three are rare
-WORTH_TOLERANCE = 1e-4  # relative, of a shift's worth above its price: 1e-9 m of the shift
-KEPT_WORTH = 0.5  # of the price: shifts worth that may be asked for at the next plan are among its first guess
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +69,7 @@ class HorizontalMotion:
         n = preview.steps
         self._preview, self._settings, self._ask = preview, settings, ask_shift
         self._matrices = Matrices(preview.P_ps, preview.P_vs, preview.P_pu, preview.P_vu, preview.P_au)
+        self._unmoved = FreeMotion(np.empty((2, n)), np.empty((2, n)), np.empty((n, 2)), np.empty((n, n)))
         back = settings.velocity_cost * preview.P_vu.T @ preview.P_vu
         back += settings.position_cost * preview.P_pu.T @ preview.P_pu
         weights = (settings.velocity_cost, settings.position_cost, settings.zmp_centre_cost, settings.footstep_cost)
@@ -113,15 +111,15 @@ class HorizontalMotion:
         Args:
             first_gradient, first_curvature: (2,) and (2, 2) of ½ uᵀ H u + gᵀ u, the cost of the first jerks to others.
         """
-        settings, matrices, n = self._settings, self._matrices, self._preview.steps
+        settings, matrices, unmoved, n = self._settings, self._matrices, self._unmoved, self._preview.steps
         m = MAX_FOOTSTEPS if support.lower.any() or support.upper.any() else 0
-        unmoved = free_motion(matrices, state, zmp.a, zmp.b, zmp.offset)
         end = End(zmp.a[-1], zmp.b[-1], zmp.offset[-1])
         edges = HalfPlanes(
             *(support.normals, support.offsets, support.shift),
             *(support.rest_normals, support.rest_offsets, support.rest_shift),
         )
-        sides = next(size for size in SIDES if size >= most_sides(edges))
+        most = look_ahead(unmoved, matrices, state, zmp.a, zmp.b, zmp.offset, edges)
+        sides = next(size for size in SIDES if size >= most)
         price = settings.delta_z_price
         for _ in range(ROUNDS):
             slots, sign = self._slots()
@@ -144,30 +142,23 @@ class HorizontalMotion:
             solution = self._workspaces[key].solve()
             if solution.status != SolveStatus.SOLVED:
                 return None, solution
-            steps = np.zeros((MAX_FOOTSTEPS, 2))
-            if m:
-                steps[:] = solution.x[2 * n : 2 * n + 2 * m].reshape(2, m).T
-            motion = Motion(*motion_of(solution.x, state, matrices, unmoved, m, slots), steps)
-            if not self._ask:
-                return motion, solution
-            worth = worth_of_shifts(
-                *(motion.com, motion.velocity, motion.delta_z, motion.zmp, steps, end, edges),
+            courses, steps = np.empty((6, n, 2)), np.empty((MAX_FOOTSTEPS, 2))
+            read_motion(courses, steps, solution.x, state, matrices, unmoved, m, slots)
+            if not self._ask or not ask_for_shifts(
+                *(self._signs, price, courses, steps, end, edges),
                 *(settings.zmp_slack_cost, settings.rest_slack_cost),
-            )
-            missing = (np.abs(worth) > (1.0 + WORTH_TOLERANCE) * price) & (self._signs != -np.sign(worth))
-            if not missing.any():
-                self._signs = np.where(np.abs(worth) > KEPT_WORTH * price, -np.sign(worth), 0.0)
-                return motion, solution
-            self._signs[missing] = -np.sign(worth[missing])
+            ):
+                jerk, com, velocity, acceleration, delta_z, zmp_course = courses
+                return Motion(jerk, com, velocity, acceleration, delta_z, zmp_course, steps), solution
         self._signs[:] = 0.0
         return None, failed(qp, SolveStatus.ITERATION_LIMIT, ROUNDS, solution.solve_time)
 
     def _slots(self) -> tuple[Slots, Vector]:
         """The slots that hold the ΔZ asked for, and their signs; 0 of an unused one, a variable on its own."""
+        if not self._signs.any():
+            return NO_SLOTS
         knots, axes = np.nonzero(self._signs)
         count = len(knots)
-        if not count:
-            return NO_SLOTS
         size = next(size for size in self._sizes if size >= count)
         slots, sign = Slots(np.full(size, -1), np.zeros(size, dtype=np.int64)), np.zeros(size)
         slots.knots[:count], slots.axes[:count], sign[:count] = knots, axes, self._signs[knots, axes]

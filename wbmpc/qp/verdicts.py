@@ -43,7 +43,10 @@ def soundness(hessian, gradient, matrix, lower, upper, matrices_changed):  # typ
 
 @short_kernel
 def closes_duality_gap(x, cost, multiplier, gradient, lower, upper, tolerance):  # type: ignore[no-untyped-def]
-    """Whether |2 f(x) − gᵀx + λᵀb| is small, b the bound on the side of λ's sign; `x` must be finite."""
+    """Whether |2 f(x) − gᵀx + λᵀb| is small, b the bound on the side of λ's sign.
+
+    Never with an x that is not finite, nor with a multiplier of the side on which there is no bound.
+    """
     dual = linear = 0.0
     for i in range(multiplier.size):
         value = multiplier[i]
@@ -53,6 +56,6 @@ def closes_duality_gap(x, cost, multiplier, gradient, lower, upper, tolerance): 
             dual += value * lower[i]
     for i in range(x.size):
         linear += gradient[i] * x[i]
-    if not isfinite(linear):
+    if not (isfinite(linear) and isfinite(dual)):  # inf <= inf
         return False
     return abs(2.0 * cost - linear + dual) <= tolerance * (1.0 + abs(cost) + abs(linear) + abs(dual))
