@@ -109,3 +109,17 @@ def test_it_is_light_or_dark_as_the_browser_is(tab: Tab, page: Path) -> None:
         ground.append(red)
     assert ground[0] > 200
     assert ground[1] < 60
+
+
+def test_a_counterfactual_away_from_its_scenario_says_whose_it_is(tab: Tab, tmp_path: Path) -> None:
+    for name in ("whole", "whole.part"):
+        write(tmp_path, name)
+    assert report(tmp_path).exit_code == 0
+    tab.open(tmp_path / "report.html", width=1400)
+    prefix = "getComputedStyle(document.querySelector('.variant a'), '::before').content"
+    press = "document.querySelector('.overview thead button').click()"
+    assert [tab.run(prefix), *(tab.run(f"{press}, {prefix}") for _ in range(3))] == [
+        "none", '"whole."', '"whole."', "none"
+    ]  # fmt: skip
+    tab.run("(words.value = 'part', words.dispatchEvent(new Event('input')))")
+    assert tab.run(prefix) == '"whole."'
