@@ -13,7 +13,7 @@ TEST_ARGS ?=
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test lint format types scenarios pictures viewer report report-pictures reference docs docs-serve bench peers lock setup clean
+.PHONY: run test lint format types scenarios pictures viewer interact-picture report report-pictures reference docs docs-serve bench peers lock setup clean
 .DELETE_ON_ERROR:
 
 run: setup
@@ -42,10 +42,16 @@ pictures: setup
 	$(BIN)/wbmpc plot $(patsubst scenarios/%.yaml,$(OUT)/%.rrd,$(wildcard scenarios/*.yaml)) --out docs/pictures
 	$(BIN)/python docs/scenarios_page.py
 
-# The pictures of docs/recordings.md, by the commands that it shows; needs Vulkan (mesa-vulkan-drivers and libvulkan1).
+# The viewer's pictures in docs/recordings.md and docs/explain.md, by the commands that they show; needs Vulkan
+# (mesa-vulkan-drivers and libvulkan1).
 viewer: setup
 	$(BIN)/wbmpc run scenarios/reach.yaml scenarios/hole.yaml --out out
-	grep '^wbmpc screenshot' docs/recordings.md | sed 's|^|$(BIN)/|' | sh -e
+	$(BIN)/wbmpc branch out/reach.rrd --at 2.3 --set forbid=table_right_1
+	grep -h '^wbmpc screenshot' docs/recordings.md docs/explain.md | sed 's|^|$(BIN)/|' | sh -e
+
+# The picture of docs/live.md: MuJoCo's window on a virtual display; needs Xvfb.
+interact-picture: setup
+	$(BIN)/python docs/interact_picture.py
 
 # One page about everything in $(OUT).
 report: setup

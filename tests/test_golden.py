@@ -60,7 +60,7 @@ def test_a_metric_off_its_tolerance_fails_the_run_everywhere(measured: dict[str,
     measured["com_height_min"], measured["reach"] = 0.25, 0.1005
     result = run(tmp_path, "--golden", str(golden))
     assert result.exit_code == 1
-    assert "metrics.com_height_min 0.25 (± 0.001 of 0.2)" in result.output.splitlines()[-1]
+    assert "metrics.com_height_min 0.25 (± 0.0003 of 0.2)" in result.output.splitlines()[-1]
     assert "reach" not in result.output.splitlines()[-1]  # 0.5 mm of 10 cm
     document = json.loads((tmp_path / "out" / "calm.json").read_text())
     assert document["passed"] is True  # its checks did

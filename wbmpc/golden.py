@@ -22,23 +22,23 @@ from wbmpc.verdict import finite, write_json
 # (absolute, relative) by unit, of a check's value or a metric. Rounding moves most by a ten-thousandth of that
 # (docs/results.md); the rest is room for a touch or a decision that falls on another tick.
 BY_UNIT: dict[str, tuple[float, float]] = {
-    "m": (0.001, 0.02),
-    "s": (0.02, 0.02),
-    "N": (0.2, 0.05),
-    "rad": (0.01, 0.02),
+    "m": (0.0002, 0.005),
+    "s": (0.02, 0.0),
+    "N": (0.1, 0.02),
+    "rad": (0.002, 0.005),
     "kg": (0.0, 1e-6),
-    "m/s": (0.005, 0.02),
-    "1": (0.005, 0.03),
+    "m/s": (0.001, 0.005),
+    "1": (0.004, 0.01),
 }
 EXACT = (0.0, 0.0)
 # Metrics: those of a kind that its unit does not tell, and the units of the others.
 BY_METRIC: dict[str, tuple[float, float]] = {
     "simulated_time": (1e-6, 0.0),
     "robot_mass": BY_UNIT["kg"],
-    "com_height_min": (0.001, 0.0),
-    "com_height_max": (0.001, 0.0),
+    "com_height_min": (0.0003, 0.0),
+    "com_height_max": (0.0003, 0.0),
     "com_speed_max": BY_UNIT["m/s"],
-    "torso_up_min": (0.005, 0.0),
+    "torso_up_min": (0.001, 0.0),
     "torque_peak_fraction": BY_UNIT["1"],
     "speed_peak_fraction": BY_UNIT["1"],
     "penetration_max": (5e-5, 0.1),
@@ -46,7 +46,7 @@ BY_METRIC: dict[str, tuple[float, float]] = {
     "hand_contacts": EXACT,
     "first_hand_contact": BY_UNIT["s"],
     "plans": EXACT,
-    "stage3_plans": (2.0, 0.05),
+    "stage3_plans": (2.0, 0.01),
 }
 
 

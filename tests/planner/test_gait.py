@@ -16,7 +16,7 @@ from wbmpc.planner.gait import EARLY, SEARCH_TIME, SupportPhase
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_interval import Interval, Transfer
 from wbmpc.scenario import GoTask, Task
-from wbmpc.signals import Vector
+from wbmpc.signals import SIDES, Vector
 
 TIMES = 0.1 * np.arange(1, 17)  # [s] knots
 NEAR = 0.025  # [s] from a lift or landing to a knot that may be taken for either side of it
@@ -137,6 +137,8 @@ def test_a_foot_that_finds_no_ground_is_taken_for_landed() -> None:
         lowest = min(lowest, run.gait.soles(1.0).positions[swing.step.side, 2])
         run.tick(touch=False)
     assert run.time - begin == pytest.approx(SEARCH_TIME, abs=3 * DT)
+    late = [text for text in run.events if "no ground" in text]
+    assert late == [f"foot {SIDES[swing.step.side]}: no ground for 0.3 s where it should have landed"]
     assert lowest == pytest.approx(-SETTINGS.search_depth, abs=1e-6)
 
 

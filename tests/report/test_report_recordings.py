@@ -16,6 +16,7 @@ from pathlib import Path
 import wbmpc.render as pictures  # isort: skip  (before mujoco: it chooses the off-screen OpenGL)
 import numpy as np
 import pytest
+from browser import a_tab
 from PIL import Image
 from report_case import Page
 from short_run import ROOT, stand
@@ -95,6 +96,26 @@ def test_a_curve_of_the_page_is_the_recorders(folder: Path, ran: tuple[Path, Run
     expected = np.interp(times, recorder.time, recorder.com_velocity[:, 0])
     np.testing.assert_allclose(high - y / SHEET * (high - low), expected, atol=0.02)
     assert np.abs(expected).max() > 0.05  # the push is in it
+
+
+@pytest.mark.usefixtures("_no_gl")
+def test_the_pointer_reads_the_curves_off_the_recorder(folder: Path, ran: tuple[Path, RunResult]) -> None:
+    with a_tab() as tab:
+        assert report(folder).exit_code == 0
+        tab.open(folder / "report.html", width=1400)
+        sheet = "document.querySelector('svg[aria-label=\"CoM velocity over time\"]')"
+        tab.run(f"{sheet}.scrollIntoView({{block: 'center', behavior: 'instant'}})")
+        left, top, width, height = tab.run(
+            f"(({{left, top, width, height}}) => [left, top, width, height])({sheet}.getBoundingClientRect())"
+        )
+        tab.pointer(left + 0.5 * width, top + 0.5 * height)
+        time, *rows = tab.run("document.querySelector('.readout').innerText").splitlines()
+        assert tab.complaints == []
+    recorder = ran[1].recorder
+    (row,) = [row for row in rows if row.startswith("CoM x ")]
+    expected = np.interp(float(time.removesuffix(" s")), recorder.time, recorder.com_velocity[:, 0])
+    assert abs(expected) > 0.05  # the push is in it
+    assert float(row.split()[2]) == pytest.approx(expected, abs=0.02)
 
 
 @pytest.mark.usefixtures("_no_gl")

@@ -21,6 +21,7 @@ from wbmpc.signals import SIDES, Vector
 
 EARLY = 0.6  # share of the swing from which a touch counts as the landing
 SEARCH_TIME = 0.6  # [s] after which a foot that finds no ground is taken for landed
+LATE = 0.3  # [s] after which it is said that it finds none
 LIFT_INSET = 0.005  # [m] of the pressure inside the sole that stays when a stride's foot lifts
 
 
@@ -134,6 +135,8 @@ class Gait:
         self._left = max(0.0, self._left - rate * dt)
         swing.sigma = 1.0 - self._left / swing.step.swing_time
         if self._left == 0.0:
+            if self._late < LATE <= self._late + dt:
+                events.append(f"foot {SIDES[side]}: no ground for {LATE:g} s where it should have landed")
             self._late += dt
             sunk = min(settings.search_speed * self._late, settings.search_depth)
             swing.lower(sunk, settings.search_speed if sunk < settings.search_depth else 0.0)

@@ -62,12 +62,13 @@ def _dress(run: Run, anchor: str, parent_shown: bool) -> dict[str, Any]:
     fields = {
         name: getattr(run, name) for name in (*Run.__dataclass_fields__, "parent", "variant", "state", "headline")
     }
+    timing = [(name, value) for name, value in numbers(run.verdict, "timing") if value is not None]  # of its own clock
     return fields | {
         "anchor": anchor,
         "grouped": bool(run.variant) and parent_shown,
         "row": _row(run),
         "triage": triage_rows(run.verdict),
-        "tables": [(block.capitalize(), numbers(run.verdict, block)) for block in ("metrics", "timing")],
+        "tables": [("Metrics", numbers(run.verdict, "metrics")), ("Timing", timing)],
         "versions": numbers(run.verdict, "versions"),
         "scenario_html": Markup(highlight(run.scenario, YamlLexer(), HtmlFormatter(nowrap=True))),
         "scenario_uri": f"data:text/yaml;base64,{b64encode(run.scenario.encode()).decode()}",

@@ -30,7 +30,7 @@ LOOK_AT: dict[Cause, str] = {
     Cause.NON_FINITE: "tab Tracker, Joint velocity; /world/disturbance; NAME.last_states.npz",
     Cause.LATE_PLAN: "tab Timing, Plan in use; tab Tracker, CoM error",
     Cause.STAGE_INFEASIBLE: "tab Solvers, Solver status; tab Stage 3, why each candidate lost",
-    Cause.CONTACT_NOT_MADE: "tab Contacts, Contact phases and the hand's force; /world/patches",
+    Cause.CONTACT_NOT_MADE: "tab Contacts, Contact phases and the hand's or foot's force; /world/patches",
     Cause.SLIP: "tab Contacts, the foot's or hand's force; /world/contacts, an arrow on the edge of its friction cone",
     Cause.SELF_COLLISION: "the 3D scene, /world/contacts; tab Contacts, Penetration",
     Cause.COLLISION: "the 3D scene, /world/contacts; tab Contacts, Penetration",

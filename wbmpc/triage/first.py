@@ -9,7 +9,7 @@ what an always-on check saw first, or by its end.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from wbmpc.triage.causes import Cause, Finding, Triage
 from wbmpc.triage.controller import late_plans, non_finite, stage_infeasible
 from wbmpc.triage.limits import joint_limits, out_of_reach, saturations
 from wbmpc.triage.pushes import pushes
-from wbmpc.triage.touch import collisions, contacts_not_made, slips
+from wbmpc.triage.touch import collisions, contacts_not_made, ground_not_met, slips
 
 SLACK = 0.03  # [s] by which a cause may be noticed after its effect
 OVER = 2.0  # [s] after which a robot that did not fall has got over something
@@ -58,13 +58,12 @@ def triage(evidence: Evidence, checks: Sequence[CheckResult]) -> Triage | None:
     events = [c.first_violation for c in failing if c.name in _EVENTS and c.first_violation is not None]
     cause = first_of(found, fall, min(events, default=np.inf))
     if fall is None or (cause is not None and cause.cause is Cause.NON_FINITE):
-        return _answer(cause or _not_reached(evidence, failing), found)
+        return _answer(evidence, cause or _not_reached(evidence, failing), found)
     if cause is None:
         what = "the capture point leaves the feet and hands that carry the robot, and nothing else went wrong before"
-        what += _switched_off(evidence.scenario)
         cause = Finding(Cause.BALANCE_LOST, fall.lost, fall.down, what)
     before = [finding for finding in found if finding.start <= fall.down]  # of a robot that lies there is no end
-    return _answer(cause, before, f"; past saving at {fall.lost:.2f} s, down at {fall.down:.2f} s")
+    return _answer(evidence, cause, before, f"; past saving at {fall.lost:.2f} s, down at {fall.down:.2f} s")
 
 
 def first_of(found: Sequence[Finding], fall: Fall | None, violated: float) -> Finding | None:
@@ -111,6 +110,7 @@ def findings(evidence: Evidence) -> list[Finding]:
         *late_plans(context, period=loop.planner_period_ticks * loop.timestep, knot=planner.horizon_step),
         *stage_infeasible(context),
         *contacts_not_made(context, resolve_patches(scenario), palm_radius),
+        *ground_not_met(context),
         *collisions(context, scenario.universal.declared_contacts),
         *slips(context, model),
         *saturations(context, scenario.tracker.torque_share),
@@ -120,13 +120,15 @@ def findings(evidence: Evidence) -> list[Finding]:
 
 
 def _not_reached(evidence: Evidence, failing: Sequence[CheckResult]) -> Finding:
-    """Nothing broke: what was asked for was not reached."""
-    off = _switched_off(evidence.scenario)
+    """Nothing broke: what was asked for was not reached; the check that was violated first says it."""
     if (reach := out_of_reach(evidence.context, evidence.model)) is not None:
-        return replace(reach[0], what=reach[0].what + off)
-    check = failing[0]
-    time = check.first_violation if check.first_violation is not None else float(evidence.context.time[-1])
-    what = f"nothing broke, and {check.name} is not met: {check.message}{off}"
+        return reach[0]
+    end = float(evidence.context.time[-1])
+    times = [end if check.first_violation is None else check.first_violation for check in failing]
+    time, check = min(zip(times, failing, strict=True), key=lambda pair: pair[0])
+    unit = "" if check.unit == "1" else f" {check.unit}"
+    value = f"{check.value:.4g}{unit} against {check.threshold:.4g}{unit}"
+    what = f"nothing broke, and {check.name} is not met, {value}: {check.message}"
     return Finding(Cause.UNREACHABLE, time, np.inf, what)
 
 
@@ -136,6 +138,7 @@ def _switched_off(scenario: Scenario) -> str:
     return "".join(f"; stage {stage} is off" for stage, on in stages.items() if not on)
 
 
-def _answer(cause: Finding, found: Sequence[Finding], after: str = "") -> Triage:
+def _answer(evidence: Evidence, cause: Finding, found: Sequence[Finding], after: str = "") -> Triage:
     everything = sorted({*found, cause}, key=lambda finding: finding.start)
-    return Triage(cause.cause, cause.start, cause.what + after, everything)
+    message = cause.what + _switched_off(evidence.scenario) + after
+    return Triage(cause.cause, cause.start, message, everything)

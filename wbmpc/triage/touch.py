@@ -17,6 +17,7 @@ from wbmpc.signals import SIDES, ContactPhase
 from wbmpc.triage.causes import Cause, Finding
 
 GIVEN_UP = re.compile(r"contact (\w+) (\S+): (missing|unreached)")  # the planner's event when it does so
+NO_GROUND = re.compile(r"foot (\w+): no ground for (\S+) s")  # the same for a foot that should have landed
 PASSED = -0.005  # [m] height of a palm's surface over its patch: where the surface should be, it is through
 NEAR = 0.03  # [m] from the patch's normal: elsewhere a palm is not at the patch, whatever its height
 LOST = 0.15  # [s] without force, of a contact that should carry load
@@ -56,6 +57,17 @@ def contacts_not_made(context: CheckContext, patches: Sequence[PatchPose], palm_
                 if stop - first >= context.ticks(LOST):
                     what = f"the {word} palm no longer pushes on patch {name}"
                     yield _not_made(context, float(context.time[first]), what)
+
+
+def ground_not_met(context: CheckContext) -> Iterator[Finding]:
+    """Feet that found no ground when they should have landed; from then until they were taken for landed."""
+    events = context.recorder.events
+    for event in events:
+        if match := NO_GROUND.match(event.text):
+            side, seconds = match.groups()
+            landed = (e.time for e in events if e.time > event.time and e.text.startswith(f"foot {side}: landed"))
+            what = f"the {side} foot found no ground where it should have landed"
+            yield Finding(Cause.CONTACT_NOT_MADE, event.time - float(seconds), next(landed, np.inf), what)
 
 
 def _not_made(context: CheckContext, time: float, what: str) -> Finding:

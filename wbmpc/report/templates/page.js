@@ -6,6 +6,11 @@ const all = (selector, root = document) => [...root.querySelectorAll(selector)];
 const filter = document.querySelector(".filter"), rows = all(".overview tbody tr");
 filter.hidden = rows.length < 2;
 const buttons = all("button", filter), input = filter.querySelector("input");
+// Counterfactuals stand under their scenario, by their own name only, as long as none is hidden or moved away.
+const together = () => {
+  const table = document.querySelector(".overview");
+  table.classList.toggle("apart", rows.some((row) => row.hidden) || table.querySelector("[aria-sort]") !== null);
+};
 const show = () => {
   const state = buttons.find((b) => b.getAttribute("aria-pressed") === "true").dataset.state;
   const words = input.value.toLowerCase().split(/\s+/);
@@ -13,6 +18,7 @@ const show = () => {
     const text = (row.cells[0].dataset.key + " " + row.textContent).toLowerCase();
     row.hidden = (state && row.dataset.state !== state) || !words.every((word) => text.includes(word));
   }
+  together();
   document.querySelector(".empty").hidden = rows.some((row) => !row.hidden);
 };
 input.addEventListener("input", show);
@@ -35,7 +41,7 @@ for (const table of all("table[data-sortable]")) {
       const next = { none: "ascending", ascending: "descending", descending: "none" }[head.ariaSort || "none"];
       all("thead th", table).forEach((h) => h.removeAttribute("aria-sort"));
       if (next !== "none") head.setAttribute("aria-sort", next);
-      table.classList.toggle("sorted", next !== "none");
+      together();
       const key = (row) => row.cells[column].dataset.key ?? row.cells[column].textContent;
       const numeric = head.classList.contains("number");
       const compare = (a, b) => {
