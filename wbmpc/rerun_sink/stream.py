@@ -161,7 +161,9 @@ class Stream:
         for name, rows in values.items():
             flat = np.concatenate([np.ravel(row) for row in rows]) if any(map(np.ndim, rows)) else np.asarray(rows)
             # Named: the reader tells an archetype's components from timelines by it.
-            made = rr.DynamicArchetype.columns(archetype=_VALUES, components={name: flat})
+            # And never empty: rerun would leave the component out, and rows that hold nothing (no contact) with it.
+            some = flat if flat.size else np.zeros(1, flat.dtype)
+            made = rr.DynamicArchetype.columns(archetype=_VALUES, components={name: some})
             columns += made.partition([np.size(row) for row in rows])
         self.columns(path, time, columns)
 
