@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wbmpc.cli_options import Changes, Debug, Out, RecordingFile, RecordingFiles, RobotFile
+from wbmpc.cli_options import Changes, Debug, Out, RecordingFile, RecordingFiles, RobotFile, finite
 from wbmpc.commands.exits import ExitCode, guarded
 
 app = typer.Typer()
@@ -32,7 +32,8 @@ def explain_command(
     recording: RecordingFile,
     overrides: Changes,
     at: Annotated[
-        float | None, typer.Option("--at", help="[s] the latest plan not later [list the plans worth a look].")
+        float | None,
+        typer.Option("--at", callback=finite, help="[s] the latest plan not later [list the plans worth a look]."),
     ] = None,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="The whole answer as JSON; - prints it.")
@@ -55,7 +56,7 @@ def explain_command(
 def branch_command(
     recording: RecordingFile,
     overrides: Changes,
-    at: Annotated[float, typer.Option("--at", help="[s] when it takes the turn.", show_default=False)],
+    at: Annotated[float, typer.Option("--at", callback=finite, help="[s] when it takes the turn.", show_default=False)],
     out: Out = Path("out"),
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no .rrd file.")] = False,
     robot: RobotFile = None,
@@ -85,8 +86,12 @@ def triage_command(recordings: RecordingFiles, robot: RobotFile = None, debug: D
 def compare_command(
     first: Annotated[Path, typer.Argument(metavar="A", help="NAME.json or NAME.rrd.", show_default=False)],
     second: Annotated[Path, typer.Argument(metavar="B", help="The same of another run.", show_default=False)],
-    atol: Annotated[float, typer.Option(min=0, help="Absolute tolerance, in each quantity's own unit.")] = 0.0,
-    rtol: Annotated[float, typer.Option(min=0, help="Relative tolerance, of the larger absolute value.")] = 0.0,
+    atol: Annotated[
+        float, typer.Option(min=0, callback=finite, help="Absolute tolerance, in each quantity's own unit.")
+    ] = 0.0,
+    rtol: Annotated[
+        float, typer.Option(min=0, callback=finite, help="Relative tolerance, of the larger absolute value.")
+    ] = 0.0,
     everything: Annotated[bool, typer.Option("--all", help="Every signal that differs, not the first ones.")] = False,
     debug: Debug = False,
 ) -> None:

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from wbmpc.errors import WbmpcError
+from wbmpc.files import writing
 from wbmpc.footage import Footage
 from wbmpc.video import save_video
 
@@ -202,11 +203,8 @@ def _save(image: Image.Image, path: Path, **options: Any) -> None:
 
 
 def _write(path: Path, content: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with writing(path):
         path.write_bytes(content)
-    except OSError as error:
-        raise WbmpcError(f"cannot write the picture {path}: {error.strerror or error}") from error
 
 
 @contextmanager
