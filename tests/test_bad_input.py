@@ -35,8 +35,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     run_scenario(pushed(), name="good", recording=folder / "good.rrd")
     content = (folder / "good.rrd").read_bytes()
     shutil.copy(SCENARIOS / "reach.yaml", folder / "good.yaml")
-    (folder / "good.json").write_text(json.dumps(VERDICT))
-    for suffix in ("rrd", "yaml", "json", "xml"):
+    (folder / "verdict.json").write_text(json.dumps(VERDICT))
+    for suffix in ("rrd", "yaml", "xml"):
         (folder / f"empty.{suffix}").write_bytes(b"")
         (folder / f"garbage.{suffix}").write_bytes(GARBAGE)
         (folder / f"folder.{suffix}").mkdir()
@@ -50,6 +50,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         other.log("/state/qpos", rr.Scalars([1.0, 2.0]))
     other.disconnect()
     (folder / "wrong.xml").write_text("<mujoco/>")
+    (folder / "void.json").write_bytes(b"")
+    (folder / "noise.json").write_bytes(GARBAGE)
     (folder / "list.json").write_text("[]")
     (folder / "numbers.json").write_text(json.dumps(VERDICT | {"checks": [1]}))
     (folder / "words.json").write_text(json.dumps(VERDICT | {"metrics": {"com_height_min": "low"}}))
@@ -77,7 +79,7 @@ def call(made: Path, monkeypatch: pytest.MonkeyPatch) -> Call:
 
 def the_line(result: Result) -> str:
     """Of a mistyped option what follows the two lines on how to call the command."""
-    (line,) = (line for line in result.stderr.splitlines() if not line.startswith(("Usage: ", "Try '")))
+    (line,) = (line for line in result.stderr.splitlines() if line and not line.startswith(("Usage: ", "Try '")))
     return line
 
 
@@ -232,13 +234,13 @@ def test_numbers_out_of_range(call: Call, command: str) -> None:
         ("doctor --robot absent.xml", "absent.xml: no such robot model"),
         ("doctor --robot folder.xml", "folder.xml: no such robot model"),
         ("compare good.yaml good.rrd", "good.yaml: neither NAME.json nor NAME.rrd"),
-        ("compare absent.json good.json", "absent.json: "),
-        ("compare good.json folder.json", "folder.json: "),
-        ("compare empty.json good.json", "empty.json: not JSON: "),
-        ("compare garbage.json good.json", "garbage.json: not JSON: "),
-        ("compare list.json good.json", "list.json: not the verdict of a run"),
-        ("compare good.json numbers.json", "numbers.json: not the verdict of a run"),
-        ("compare words.json good.json", "words.json: not the verdict of a run"),
+        ("compare absent.json verdict.json", "absent.json: "),
+        ("compare verdict.json taken/reach.json", "taken/reach.json: "),
+        ("compare void.json verdict.json", "void.json: not JSON: "),
+        ("compare noise.json verdict.json", "noise.json: not JSON: "),
+        ("compare list.json verdict.json", "list.json: not the verdict of a run"),
+        ("compare verdict.json numbers.json", "numbers.json: not the verdict of a run"),
+        ("compare words.json verdict.json", "words.json: not the verdict of a run"),
         ("report absent.json", "no such file or folder: absent.json"),
         ("report list.json", "list.json: not the verdict of a run"),
         ("report good.yaml", "good.yaml: neither a recording (.rrd), nor a verdict (.json)"),
@@ -262,18 +264,19 @@ def test_a_robot_that_is_not_the_recorded_one(call: Call, command: str, robot: s
     "command",
     [
         "run good.yaml --out {}", "run good.yaml --write-golden {}", "interact good.yaml --out {}",
-        "sweep good.yaml --draws 1 --out {}", "latency good.yaml --out {}", "explain good.rrd --at 0.1 --json {}/a.json",
+        "sweep good.yaml --draws 1 --out {}", "latency good.yaml --out {}",
+        "explain good.rrd --at 0.1 --json {}/a.json",
         "branch good.rrd --at 0.1 --out {}", "branch good.rrd --at 0.1 --no-record --out {}",
         "render good.rrd --out {}/a.png --width 16", "render good.rrd --out {}/a.gif --width 16 --to 0.1",
         "plot good.rrd --frames 0 --out {}", "report good.rrd --out {}/page.html", "screenshot good.rrd --out {}/a.png",
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("folder", ["good.json", "good.json/deep"])
+@pytest.mark.parametrize("folder", ["verdict.json", "verdict.json/deep"])
 def test_a_folder_that_cannot_be_made(call: Call, command: str, folder: str) -> None:
     line = call(*command.format(folder).split())
     if "OpenGL" in line:
         pytest.skip("no OpenGL here")
-    assert line.endswith(": good.json is no folder")
+    assert line.endswith(": verdict.json is no folder")
     assert folder in line
 
 

@@ -61,7 +61,9 @@ def render_command(
 def screenshot_command(
     recording: RecordingFile,
     target: Annotated[Path, typer.Option("--out", metavar="FILE", help=".png or .webp.")] = Path("out/viewer.png"),
-    moment: Annotated[float | None, typer.Option("--time", help="[s] [where the viewer opens].")] = None,
+    moment: Annotated[
+        float | None, typer.Option("--time", callback=finite, help="[s] [where the viewer opens].")
+    ] = None,
     tab: Annotated[str | None, typer.Option(help="Tab in front, e.g. Planner or Mismatch [the first].")] = None,
     view: Annotated[
         str | None, typer.Option(help="Only the view of that title, e.g. Robot [the whole window].")

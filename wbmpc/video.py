@@ -24,14 +24,14 @@ def save_video(frames: Iterable[NDArray[np.uint8]], path: Path, *, frame_rate: f
     Raises:
         WbmpcError: imageio-ffmpeg is not installed, there is no frame, or the file cannot be written.
     """
-    ffmpeg = _ffmpeg(path)
+    encoder = ffmpeg(path)
     frames = iter(frames)
     first = next(frames, None)
     if first is None:
         raise WbmpcError(f"cannot write the video {path}: it has no frames")
     height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
     with writing(path):  # ffmpeg's own complaints are an OSError, too
-        writer = ffmpeg.write_frames(
+        writer = encoder.write_frames(
             str(path),
             (width, height),
             fps=frame_rate,
@@ -45,7 +45,8 @@ def save_video(frames: Iterable[NDArray[np.uint8]], path: Path, *, frame_rate: f
         writer.close()
 
 
-def _ffmpeg(path: Path) -> Any:
+def ffmpeg(path: Path) -> Any:
+    """What writes the video `path`. Raises WbmpcError when it is not installed."""
     try:
         import imageio_ffmpeg
     except ImportError as error:
