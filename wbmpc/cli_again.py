@@ -32,8 +32,7 @@ def explain_command(
     recording: RecordingFile,
     overrides: Changes,
     at: Annotated[
-        float | None,
-        typer.Option("--at", callback=finite, help="[s] the latest plan not later [list the plans worth a look]."),
+        float | None, typer.Option("--at", help="[s] the latest plan not later [list the plans worth a look].")
     ] = None,
     json: Annotated[
         Path | None, typer.Option("--json", metavar="FILE", help="The whole answer as JSON; - prints it.")
@@ -56,7 +55,7 @@ def explain_command(
 def branch_command(
     recording: RecordingFile,
     overrides: Changes,
-    at: Annotated[float, typer.Option("--at", callback=finite, help="[s] when it takes the turn.", show_default=False)],
+    at: Annotated[float, typer.Option("--at", help="[s] when it takes the turn.", show_default=False)],
     out: Out = Path("out"),
     no_record: Annotated[bool, typer.Option("--no-record", help="Write no .rrd file.")] = False,
     robot: RobotFile = None,
