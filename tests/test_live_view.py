@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
@@ -41,7 +42,12 @@ def receiver(path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A viewer without a window, which saves what it is sent; its address."""
     port = free_port()
     command = [Path(sys.executable).with_name("rerun"), "--port", str(port), "--save", path]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # the command is a shim that starts the viewer: both end together
+    )
     try:
         give_up = monotonic() + 120.0
         while True:
@@ -95,7 +101,7 @@ def test_the_verdict_is_shown_at_the_end(runs: tuple[RunResult, RunResult, Path,
 def test_a_viewer_that_is_closed_ends_no_run(tmp_path: Path) -> None:
     with receiver(tmp_path / "sent.rrd") as (address, process):
         url = viewer_at(address)
-        process.kill()
+        os.killpg(process.pid, signal.SIGKILL)
         process.wait()
         result = run_scenario(stand(duration=0.5), name="stand", viewer=url)
     assert result.recorder.ticks == 500
