@@ -8,7 +8,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Event
 from time import monotonic, sleep
@@ -46,7 +46,7 @@ def receiver(path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
         command,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        start_new_session=True,  # the command is a shim that starts the viewer: both end together
+        start_new_session=True,  # the command is a shim that starts the viewer
     )
     try:
         give_up = monotonic() + 120.0
@@ -62,6 +62,8 @@ def receiver(path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60.0)
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +103,7 @@ def test_the_verdict_is_shown_at_the_end(runs: tuple[RunResult, RunResult, Path,
 def test_a_viewer_that_is_closed_ends_no_run(tmp_path: Path) -> None:
     with receiver(tmp_path / "sent.rrd") as (address, process):
         url = viewer_at(address)
-        os.killpg(process.pid, signal.SIGKILL)
+        process.kill()
         process.wait()
         result = run_scenario(stand(duration=0.5), name="stand", viewer=url)
     assert result.recorder.ticks == 500
