@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Event
 from time import monotonic, sleep
@@ -41,7 +42,12 @@ def receiver(path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """A viewer without a window, which saves what it is sent; its address."""
     port = free_port()
     command = [Path(sys.executable).with_name("rerun"), "--port", str(port), "--save", path]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    process = subprocess.Popen(
+        command,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,  # the command is a shim that starts the viewer
+    )
     try:
         give_up = monotonic() + 120.0
         while True:
@@ -56,6 +62,8 @@ def receiver(path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     finally:
         process.send_signal(signal.SIGINT)
         process.wait(60.0)
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 @pytest.fixture(scope="module")

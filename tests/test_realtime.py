@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+from collections import deque
 from collections.abc import Callable
 from threading import Event, Semaphore, active_count
 from time import perf_counter, sleep
@@ -188,6 +189,15 @@ def test_the_planner_takes_the_newest_snapshot_and_leaves_out_older_ones() -> No
     assert worker.skipped == 2
 
 
+def test_snapshots_that_were_replaced_are_forgotten() -> None:
+    asked = deque(SimpleNamespace(time=0.01 * k) for k in range(1, 6))
+    third, fourth = asked[2], asked[3]
+    plan = SimpleNamespace(report=SimpleNamespace(time=third.time))
+    assert realtime._snapshot_of(plan, asked) is third  # type: ignore[arg-type]
+    assert asked[0] is fourth
+    assert len(asked) == 2
+
+
 def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """However fast the machine, each plan waits for 35 ticks: they go on, on the tail of the plan before."""
     solve, recorder = Planner.solve, new_recorder(scenario := stand(duration=0.4, loop__realtime_planner="thread"))
@@ -206,6 +216,7 @@ def test_a_slow_planner_is_late_and_holds_no_tick_up(monkeypatch: pytest.MonkeyP
     assert timing.plan_latency.min() > 0.0345
     assert timing.late_plans == len(timing.effects) == len(recorder.plans) - 1 >= 1
     assert timing.skipped_plans >= 2 * (timing.late_plans - 1)  # between two that are planned, 35 ticks or more apart
+    assert [state.time for state, _ in recorder.planned] == [plan.time for plan in recorder.plans[1:]]
     summary = timing.summary()
     assert summary["late_plans"] == summary["plans"]
     assert summary["plan_latency_max"] >= summary["plan_latency_p50"] > 0.0345

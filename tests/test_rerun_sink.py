@@ -23,6 +23,7 @@ from wbmpc.rerun_sink.documents import Table, firing_document, parts_of, verdict
 from wbmpc.rerun_sink.glyphs import drawable
 from wbmpc.rerun_sink.palette import METRES_PER_NEWTON
 from wbmpc.rerun_sink.reading import Recording
+from wbmpc.rerun_sink.ticks import CONTACT_GEOMS
 
 VERDICT = {
     "scenario": "small",
@@ -147,6 +148,15 @@ def test_properties_and_verdict(recorded: tuple[Recorder, Recording]) -> None:
     assert recording.static("/__properties/metrics", "com_height_min") == [0.25]
     assert "name: small" in recording.static("/scenario", "text")[0]
     assert "FAIL" in recording.static("/verdict", "text")[0]
+
+
+def test_who_touches_whom_has_a_row_for_every_sample(recorded: tuple[Recorder, Recording]) -> None:
+    """Also where nothing is touched in a whole block, as in the first one."""
+    recorder, recording = recorded
+    times, pairs = recording.column(CONTACT_GEOMS, "geoms")
+    np.testing.assert_array_equal(times, recording.column("/state/qpos", "scalars")[0])
+    assert [len(pair) // 2 for pair in pairs] == recorder.contact_count[::10].tolist()
+    assert not len(pairs[0])
 
 
 def test_visible_geoms_are_drawn_and_collision_geoms_are_not(recorded: tuple[Recorder, Recording]) -> None:
@@ -291,7 +301,7 @@ def test_rates_must_divide(tmp_path: Path) -> None:
 def test_unwritable_path_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for path in (tmp_path / "file" / "a.rrd", tmp_path):
-        with pytest.raises(WbmpcError, match="cannot write the recording"):
+        with pytest.raises(WbmpcError, match="cannot write "):
             open_sink(path, small_run.new_recorder())
 
 

@@ -62,6 +62,14 @@ def test_what_is_not_there_is_answered_with_the_choices(shown: Viewer) -> None:
         shown.go_to(9.0)
 
 
+def test_a_recording_that_was_cut_short_is_shown(recording: Path, shown: Viewer, tmp_path: Path) -> None:
+    """`shown`: only where there is a viewer at all."""
+    cut = tmp_path / "cut.rrd"
+    cut.write_bytes(recording.read_bytes()[:-100])
+    with headless_viewer(cut, width=300, height=200) as viewer:
+        viewer.go_to(0.06)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -11,7 +11,6 @@ import mujoco
 import numpy as np
 
 from wbmpc.checks.fall import FallWatch
-from wbmpc.errors import WbmpcError
 from wbmpc.explain.changes import Change
 from wbmpc.explain.explanation import apply
 from wbmpc.explain.past import Past
@@ -68,10 +67,7 @@ def branch(
         WbmpcError: the time is outside the recording, or the file cannot be written.
     """
     scenario, recorded = past.run.scenario, past.run.run
-    tick, ticks = round(at / scenario.loop.timestep), round(scenario.duration * scenario.loop.physics_rate)
-    if not 0 <= tick < recorded.schedule.ticks:
-        end = recorded.schedule.ticks * scenario.loop.timestep
-        raise WbmpcError(f"--at {at:g}: outside the recording, which ends at {end:g} s")
+    tick, ticks = past.tick_at(at), round(scenario.duration * scenario.loop.physics_rate)
     report = on_progress or (lambda name, time: None)
 
     def make(name: str, changed: Change | None, sink: Any = None, **parts: Any) -> Future:

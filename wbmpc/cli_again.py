@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wbmpc.cli_options import Changes, Debug, Out, RecordingFile, RecordingFiles, RobotFile
+from wbmpc.cli_options import Changes, Debug, Out, RecordingFile, RecordingFiles, RobotFile, finite
 from wbmpc.commands.exits import ExitCode, guarded
 
 app = typer.Typer()
@@ -85,8 +85,12 @@ def triage_command(recordings: RecordingFiles, robot: RobotFile = None, debug: D
 def compare_command(
     first: Annotated[Path, typer.Argument(metavar="A", help="NAME.json or NAME.rrd.", show_default=False)],
     second: Annotated[Path, typer.Argument(metavar="B", help="The same of another run.", show_default=False)],
-    atol: Annotated[float, typer.Option(min=0, help="Absolute tolerance, in each quantity's own unit.")] = 0.0,
-    rtol: Annotated[float, typer.Option(min=0, help="Relative tolerance, of the larger absolute value.")] = 0.0,
+    atol: Annotated[
+        float, typer.Option(min=0, callback=finite, help="Absolute tolerance, in each quantity's own unit.")
+    ] = 0.0,
+    rtol: Annotated[
+        float, typer.Option(min=0, callback=finite, help="Relative tolerance, of the larger absolute value.")
+    ] = 0.0,
     everything: Annotated[bool, typer.Option("--all", help="Every signal that differs, not the first ones.")] = False,
     debug: Debug = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from wbmpc.cli_options import Debug, Jobs, RecordingFile, RecordingFiles
+from wbmpc.cli_options import Debug, Jobs, RecordingFile, RecordingFiles, finite
 from wbmpc.commands.exits import ExitCode, guarded
 
 app = typer.Typer()
@@ -31,9 +31,11 @@ def render_command(
     ] = 1.0,
     width: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
     height: Annotated[int, typer.Option(min=16, max=4096, help="[px]")] = 800,
-    azimuth: Annotated[float, typer.Option(help="[deg] direction of view about z: 90 along +y.")] = 75.0,
-    elevation: Annotated[float, typer.Option(help="[deg] negative: from above.")] = -14.0,
-    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.15,
+    azimuth: Annotated[
+        float, typer.Option(callback=finite, help="[deg] direction of view about z: 90 along +y.")
+    ] = 75.0,
+    elevation: Annotated[float, typer.Option(callback=finite, help="[deg] negative: from above.")] = -14.0,
+    distance: Annotated[float, typer.Option(min=0.05, callback=finite, help="[m] from the robot.")] = 1.15,
     debug: Debug = False,
 ) -> None:
     def work() -> ExitCode:
@@ -59,7 +61,9 @@ def render_command(
 def screenshot_command(
     recording: RecordingFile,
     target: Annotated[Path, typer.Option("--out", metavar="FILE", help=".png or .webp.")] = Path("out/viewer.png"),
-    moment: Annotated[float | None, typer.Option("--time", help="[s] [where the viewer opens].")] = None,
+    moment: Annotated[
+        float | None, typer.Option("--time", callback=finite, help="[s] [where the viewer opens].")
+    ] = None,
     tab: Annotated[str | None, typer.Option(help="Tab in front, e.g. Planner or Mismatch [the first].")] = None,
     view: Annotated[
         str | None, typer.Option(help="Only the view of that title, e.g. Robot [the whole window].")
@@ -111,9 +115,12 @@ def plot_command(
     width: Annotated[int, typer.Option(min=16, max=2048, help="[px] of each picture.")] = 210,
     height: Annotated[int, typer.Option(min=16, max=2048, help="[px]")] = 270,
     azimuth: Annotated[
-        float | None, typer.Option(help="[deg] direction of view about z: 90 along +y [what shows the motion best].")
+        float | None,
+        typer.Option(
+            callback=finite, help="[deg] direction of view about z: 90 along +y [what shows the motion best]."
+        ),
     ] = None,
-    distance: Annotated[float, typer.Option(min=0.05, help="[m] from the robot.")] = 1.05,
+    distance: Annotated[float, typer.Option(min=0.05, callback=finite, help="[m] from the robot.")] = 1.05,
     debug: Debug = False,
 ) -> None:
     def work() -> ExitCode:

@@ -92,7 +92,20 @@ def read_result(path: Path) -> tuple[dict[str, Any], Recording | None]:
         raise WbmpcError(f"{path}: not JSON: {error}") from None
     if not isinstance(document, dict) or not {"metrics", "checks", "state_sha256"} <= document.keys():
         raise WbmpcError(f"{path}: not the verdict of a run (it has no metrics, checks and state_sha256)")
+    try:
+        numbers_of(document)
+    except (AttributeError, KeyError, TypeError, ValueError):
+        raise WbmpcError(
+            f"{path}: not the verdict of a run (metrics: a number or null by name; checks: a list of name and value)"
+        ) from None
     return document, None
+
+
+def numbers_of(verdict: Mapping[str, Any]) -> dict[str, float | None]:
+    """Metrics and the values of checks, by name; None where one could not be measured."""
+    values = {f"metrics.{name}": value for name, value in verdict["metrics"].items()}
+    values |= {f"checks.{row['name']}": row["value"] for row in verdict["checks"]}
+    return {name: None if value is None else float(value) for name, value in values.items()}
 
 
 def compare_results(a: Path, b: Path, tolerance: Tolerance) -> Comparison:
@@ -117,10 +130,7 @@ def compare_results(a: Path, b: Path, tolerance: Tolerance) -> Comparison:
 
 
 def _numbers(a: Mapping[str, Any], b: Mapping[str, Any], tolerance: Tolerance) -> Iterator[NumberRow]:
-    sides = []
-    for document in (a, b):
-        checks = {f"checks.{row['name']}": row["value"] for row in document["checks"]}
-        sides.append({f"metrics.{name}": value for name, value in document["metrics"].items()} | checks)
+    sides = [numbers_of(verdict) for verdict in (a, b)]
     for name in dict.fromkeys([*sides[0], *sides[1]]):
         x, y = (side.get(name) for side in sides)
         pair = [np.array([np.nan if value is None else value], float) for value in (x, y)]

@@ -110,7 +110,7 @@ def read_golden(path: Path) -> Golden:
         WbmpcError: no such file, or not a golden result; says which key.
     """
     try:
-        return Golden.model_validate_json(path.read_text(encoding="utf-8"))
+        return Golden.model_validate_json(path.read_bytes())
     except OSError as error:
         raise WbmpcError(f"no golden result {path} ({error.strerror}); make it with --write-golden") from None
     except ValidationError as error:

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from wbmpc.checks.result import CheckResult
+from wbmpc.files import writing
 
 # XML 1.0 has no way to write these, not even escaped.
 _FORBIDDEN = {code: "?" for code in range(32) if chr(code) not in "\t\n\r"}
@@ -41,7 +42,7 @@ def case_of(check: CheckResult, detail: str = "") -> Case:
 
 
 def write_junit(path: Path, suites: Sequence[Suite]) -> None:
-    """Write all suites to `path`."""
+    """Write all suites to `path`. Raises WbmpcError when that is impossible."""
     root = ElementTree.Element("testsuites", name="wbmpc")
     for suite in suites:
         failures = sum(case.failure is not None for case in suite.cases)
@@ -59,7 +60,8 @@ def write_junit(path: Path, suites: Sequence[Suite]) -> None:
             if case.failure is not None:
                 ElementTree.SubElement(item, "failure", message=_clean(case.failure)).text = _clean(case.detail) or None
     ElementTree.indent(root)
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    with writing(path):
+        ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
 
 
 def _clean(text: str) -> str:

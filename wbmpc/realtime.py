@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from queue import Empty, SimpleQueue
@@ -76,7 +77,7 @@ def run_realtime(
     timing.begin(timestep=step, realtime=True)
     finished = Mailbox()  # the tracker sees a plan only when the tick has taken it over and counted its latency
     due = False
-    asked: dict[float, RobotState] = {}  # snapshots by their time [s]; those that a newer one replaces stay
+    asked: deque[RobotState] = deque()  # snapshots whose plans have not come, the oldest first
 
     def exchange(state: RobotState) -> None:
         """Take the plans that are ready, hand over a snapshot when one is due."""
@@ -85,11 +86,11 @@ def run_realtime(
             snapshot, ready = round(plan.time / step), recorder.ticks
             effect = max(ready, snapshot + delay)
             session.mailbox.post(plan, available_at=plan.time + (effect - snapshot) * step)
-            recorder.append_plan(plan.report, asked.pop(plan.report.time))
+            recorder.append_plan(plan.report, _snapshot_of(plan, asked))
             timing.plan(snapshot=snapshot, effect=effect, ready=ready)
             timing.late_plans += ready - snapshot > max(delay, period)
         if due:
-            asked[state.time] = state
+            asked.append(state)
             worker.request(state, operator.orders() if operator is not None else ())
 
     with (
@@ -207,6 +208,13 @@ class PlannerThread:
             self.skipped += following is not None
             newest = following if following is None else (following[0], [*newest[1], *following[1]])
         return newest
+
+
+def _snapshot_of(plan: Plan, asked: deque[RobotState]) -> RobotState:
+    """Take out the snapshot that `plan` was made from and all before it: plans come in order, older ones never will."""
+    while (snapshot := asked.popleft()).time < plan.report.time:
+        pass
+    return snapshot
 
 
 def _wait_until(deadline: float) -> float:

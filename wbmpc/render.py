@@ -24,8 +24,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from wbmpc.errors import WbmpcError
+from wbmpc.files import prepare, writing
 from wbmpc.footage import Footage
-from wbmpc.video import save_video
+from wbmpc.video import ffmpeg, save_video
 
 _NO_GL = "no off-screen OpenGL (MUJOCO_GL={backend}): {reason}. On Debian: apt-get install {packages}"
 _PACKAGES = "libegl1 libegl-mesa0 libgl1-mesa-dri"
@@ -148,15 +149,30 @@ def save_picture(frames: Sequence[NDArray[np.uint8]], path: Path) -> None:
     _save(Image.fromarray(np.concatenate(list(frames), axis=1)), path)
 
 
-def save_animation(frames: Sequence[NDArray[np.uint8]], path: Path, *, frame_rate: float) -> None:
-    """An endless .webp or .gif, or a .mp4, at `frame_rate` [Hz].
+def prepare_animation(path: Path, *, frame_rate: float) -> None:
+    """What `save_animation` would refuse, before minutes of drawing.
 
     Raises:
-        WbmpcError: another suffix, a .gif of more than 50 Hz, no writer of .mp4, or the file cannot be written.
+        WbmpcError: another suffix, a .gif of more than 50 Hz, no writer of .mp4, or the folder cannot be made.
     """
     suffix = path.suffix.lower()
     if suffix not in ANIMATIONS:
         raise WbmpcError(f"{path}: an animation is one of {', '.join(ANIMATIONS)}")
+    if suffix == ".gif" and frame_rate > _GIF_RATE:
+        raise WbmpcError(f"a .gif has at most {_GIF_RATE} frames a second, not {frame_rate:g}; a .webp has more")
+    if suffix == ".mp4":
+        ffmpeg(path)
+    prepare(path)
+
+
+def save_animation(frames: Sequence[NDArray[np.uint8]], path: Path, *, frame_rate: float) -> None:
+    """An endless .webp or .gif, or a .mp4, at `frame_rate` [Hz].
+
+    Raises:
+        WbmpcError: as `prepare_animation`, or the file cannot be written.
+    """
+    prepare_animation(path, frame_rate=frame_rate)
+    suffix = path.suffix.lower()
     if suffix == ".mp4":
         save_video(frames, path, frame_rate=frame_rate)
         return
@@ -165,8 +181,6 @@ def save_animation(frames: Sequence[NDArray[np.uint8]], path: Path, *, frame_rat
 
 def encoded_animation(frames: Sequence[NDArray[np.uint8]], suffix: str, *, frame_rate: float, **options: Any) -> bytes:
     """The content of an endless .webp or .gif; `options` are the encoder's."""
-    if suffix == ".gif" and frame_rate > _GIF_RATE:
-        raise WbmpcError(f"a .gif has at most {_GIF_RATE} frames a second, not {frame_rate:g}; a .webp has more")
     first, *rest = [Image.fromarray(frame) for frame in frames]
     options |= {
         "save_all": True,
@@ -202,11 +216,8 @@ def _save(image: Image.Image, path: Path, **options: Any) -> None:
 
 
 def _write(path: Path, content: bytes) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with writing(path):
         path.write_bytes(content)
-    except OSError as error:
-        raise WbmpcError(f"cannot write the picture {path}: {error.strerror or error}") from error
 
 
 @contextmanager

@@ -53,7 +53,7 @@ class Journal:
             return b""
         try:
             found, *self.rows = (json.loads(line) for line in complete.splitlines())
-            there = found["sweep"]
+            there = dict(found["sweep"])
         except (ValueError, KeyError, TypeError):
             raise WbmpcError(f"{self.path}: not the journal of a sweep; remove it to start anew") from None
         changed = [key for key in header if there.get(key) != header[key]]

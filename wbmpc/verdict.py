@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from wbmpc.checks.result import CheckResult
+from wbmpc.files import writing
 from wbmpc.recorder import Recorder
 from wbmpc.signals import SolveStatus, StageReport, Vector
 from wbmpc.triage.causes import Triage
@@ -71,10 +72,15 @@ class Verdict:
 
 
 def write_json(path: Path, document: Mapping[str, Any]) -> None:
-    """Write a JSON document with a stable layout; a killed process leaves the old file or the new one."""
+    """Write a JSON document with a stable layout; a killed process leaves the old file or the new one.
+
+    Raises:
+        WbmpcError: the file cannot be written.
+    """
     partial = path.with_name(path.name + ".partial")
-    partial.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    partial.replace(path)
+    with writing(path):
+        partial.write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        partial.replace(path)
 
 
 def solver_statistics(recorder: Recorder) -> dict[str, dict[str, float]]:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.errors import WbmpcError
+from wbmpc.files import writing
 
 _QUALITY = 8  # of 10
 
@@ -23,15 +24,14 @@ def save_video(frames: Iterable[NDArray[np.uint8]], path: Path, *, frame_rate: f
     Raises:
         WbmpcError: imageio-ffmpeg is not installed, there is no frame, or the file cannot be written.
     """
-    ffmpeg = _ffmpeg(path)
+    encoder = ffmpeg(path)
     frames = iter(frames)
     first = next(frames, None)
     if first is None:
         raise WbmpcError(f"cannot write the video {path}: it has no frames")
     height, width = first.shape[0] // 2 * 2, first.shape[1] // 2 * 2
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        writer = ffmpeg.write_frames(
+    with writing(path):  # ffmpeg's own complaints are an OSError, too
+        writer = encoder.write_frames(
             str(path),
             (width, height),
             fps=frame_rate,
@@ -43,12 +43,10 @@ def save_video(frames: Iterable[NDArray[np.uint8]], path: Path, *, frame_rate: f
         for frame in (first, *frames):
             writer.send(np.ascontiguousarray(frame[:height, :width]))
         writer.close()
-    except OSError as error:  # ffmpeg's own complaints come as one, too
-        reason = error.strerror or (str(error).strip().splitlines() or ["ffmpeg failed"])[-1]
-        raise WbmpcError(f"cannot write the video {path}: {reason}") from error
 
 
-def _ffmpeg(path: Path) -> Any:
+def ffmpeg(path: Path) -> Any:
+    """What writes the video `path`. Raises WbmpcError when it is not installed."""
     try:
         import imageio_ffmpeg
     except ImportError as error:

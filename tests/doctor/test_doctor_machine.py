@@ -152,8 +152,8 @@ def call(monkeypatch: pytest.MonkeyPatch) -> Any:
 
     def with_findings(*statuses: Status) -> Any:
         found = [Finding(f"check {k}", status, f"found {k} [x]", f"hint {k}") for k, status in enumerate(statuses)]
-        monkeypatch.setattr(command, "examine_machine", lambda: found[:1])
-        monkeypatch.setattr(command, "examine_robot", lambda path: found[1:])
+        monkeypatch.setattr(command, "examine_machine", lambda on_done: found[:1])
+        monkeypatch.setattr(command, "examine_robot", lambda path, on_done: found[1:])
         return lambda *words: CliRunner().invoke(app, ["doctor", *words])
 
     return with_findings

@@ -15,6 +15,7 @@ from wbmpc.commands.progress import simulated_time
 from wbmpc.errors import WbmpcError
 from wbmpc.explain.changes import OF_A_RUN, Change, change_of
 from wbmpc.explain.past import Past, open_past
+from wbmpc.files import make_folder
 from wbmpc.verdict import finite, write_json
 from wbmpc.warm_up import compile_kernels
 
@@ -44,6 +45,8 @@ def branch(path: Path, options: BranchOptions) -> ExitCode:
     recording = options.out / f"{past.run.name}.branch.rrd"
     if options.record and recording.resolve() == path.resolve():
         raise WbmpcError(f"--out {options.out}: {recording} would replace the recording that is read")
+    past.tick_at(options.at)  # known before minutes of runs
+    make_folder(options.out)
     compile_kernels()
     duration = past.run.scenario.duration
     with simulated_time(f"{past.run.name} twice", 2 * duration) as on_progress:
@@ -86,8 +89,4 @@ def _write(both: Branch, change: Change, past: Past, target: Path) -> None:
         "original": both.original.verdict.as_dict(),
         "branch": both.changed.verdict.as_dict(),
     }
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_json(target, finite(document))
-    except OSError as error:
-        raise WbmpcError(f"--out {target.parent}: {error.strerror}") from None
+    write_json(target, finite(document))

@@ -12,9 +12,12 @@ from rich.table import Table
 from rich.text import Text
 
 from wbmpc.commands.exits import ExitCode
+from wbmpc.commands.progress import counted
 from wbmpc.commands.tables import console
 from wbmpc.doctor.check import Finding, Status
+from wbmpc.doctor.machine.checks import CHECKS as MACHINE_CHECKS
 from wbmpc.doctor.machine.checks import examine_machine
+from wbmpc.doctor.robot.checks import CHECKS as ROBOT_CHECKS
 from wbmpc.doctor.robot.checks import examine_robot
 from wbmpc.errors import RobotError
 from wbmpc.scenario.robot_file import find_robot
@@ -37,7 +40,8 @@ def doctor(robot: str, *, as_json: bool) -> ExitCode:
         if robot.endswith(".xml"):
             raise RobotError(f"{robot}: no such robot model")
         path = find_robot(robot, scenario_directory=Path())
-    machine, body = examine_machine(), examine_robot(path)
+    with counted("doctor", len(MACHINE_CHECKS) + len(ROBOT_CHECKS)) as advance:
+        machine, body = examine_machine(advance), examine_robot(path, advance)
     everything = [*machine, *body]
     failed = [finding for finding in everything if finding.status is Status.FAIL]
     if as_json:

@@ -16,6 +16,7 @@ from wbmpc.explain.changes import OF_A_PLAN, change_of
 from wbmpc.explain.explanation import Explanation
 from wbmpc.explain.explanation import explain as solve_again
 from wbmpc.explain.past import Past, open_past
+from wbmpc.files import prepare, writing
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +39,14 @@ def explain(path: Path, options: ExplainOptions) -> ExitCode:
     """
     past = open_past(path, robot=options.robot)
     if options.at is None:
-        if options.overrides:
-            raise WbmpcError("--set: say with --at which plan")
+        for option, given in (("--set", options.overrides), ("--json", options.json)):
+            if given:
+                raise WbmpcError(f"{option}: say with --at which plan")
         print_notable(past)
         return ExitCode.PASSED
     index = past.index_at(options.at)
+    if options.json not in (None, Path("-")):
+        prepare(options.json)
     change = change_of(past.run.scenario, options.overrides, allowed=OF_A_PLAN) if options.overrides else None
     time = past.plans[index].state.time
     with simulated_time(f"{past.run.name} again", time) as on_progress:
@@ -75,8 +79,5 @@ def _write(answer: Explanation, past: Past, target: Path) -> None:
     if target == Path("-"):
         print(text, flush=True)
         return
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with writing(target):
         target.write_text(text + "\n", encoding="utf-8")
-    except OSError as error:
-        raise WbmpcError(f"--json {target}: {error.strerror}") from None

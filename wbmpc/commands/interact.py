@@ -10,8 +10,8 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from wbmpc.commands.exits import ExitCode, say
-from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import print_checks, timing_line
+from wbmpc.files import make_folder
 from wbmpc.scenario import Scenario, load_scenario
 
 

@@ -16,11 +16,11 @@ from rich.text import Text
 from wbmpc.checks.settings import UniversalSettings
 from wbmpc.commands.exits import ExitCode
 from wbmpc.commands.progress import counted
-from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import console, number
 from wbmpc.errors import ScenarioError, WbmpcError
 from wbmpc.figures.figure import FORMATS, save_figure
 from wbmpc.figures.latency import latency_figure
+from wbmpc.files import make_folder
 from wbmpc.latency import KEY, Row, at_delay, boundary, first_failed, key_check, margin, run_delays
 from wbmpc.pool import available_cores
 from wbmpc.scenario import Scenario, load_scenario
@@ -57,7 +57,7 @@ def latency(path: Path, options: LatencyOptions) -> ExitCode:
     scenario = load_scenario(path, options.overrides, options.seed)
     delays = [_ticks(scenario, delay) for delay in options.delays or DELAYS]  # known before minutes of runs
     make_folder(options.out)
-    with counted(scenario.name, len(set(delays)), 0) as advance:
+    with counted(scenario.name, len(set(delays))) as advance:
         rows = run_delays(
             scenario, delays, jobs=options.jobs or available_cores(), on_done=lambda row: advance(_word(row))
         )

@@ -18,6 +18,7 @@ from wbmpc.commands.reproduce import run_command
 from wbmpc.commands.tables import cause_lines, final_line, golden_words
 from wbmpc.counterfactuals import ending, objection
 from wbmpc.errors import WbmpcError
+from wbmpc.files import writing
 from wbmpc.golden import Golden, against_golden, write_golden
 from wbmpc.junit import Case, Suite, case_of
 from wbmpc.recorder import Recorder
@@ -78,9 +79,10 @@ class Job:
         return self.file("rrd") if self.record else None
 
     def remove_files(self) -> None:
-        """Results of an earlier run must not pass for this one's."""
+        """Results of an earlier run must not pass for this one's. Raises WbmpcError for what is no file."""
         for suffix in _FILES:
-            self.file(suffix).unlink(missing_ok=True)
+            with writing(self.file(suffix)):
+                self.file(suffix).unlink(missing_ok=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,7 @@
-"""Progress of long commands: a bar on a terminal, a line now and then elsewhere. Standard error only."""
+"""Progress of long commands: a bar on a terminal; elsewhere nothing or, for logs, a line now and then.
+
+Standard error only.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,12 @@ from wbmpc.commands.exits import say
 
 
 @contextmanager
-def simulated_time(name: str, duration: float) -> Iterator[Callable[[float], None]]:
-    """Progress of one run; the callable takes the simulated time so far [s]."""
+def simulated_time(name: str, duration: float, *, log: bool = False) -> Iterator[Callable[[float], None]]:
+    """Progress of one run; the callable takes the simulated time so far [s]. `log`: without a terminal, one line."""
     console = Console(stderr=True)
     if not console.is_terminal:
-        say(f"running {name} ({duration:g} s simulated)")
+        if log:
+            say(f"running {name} ({duration:g} s simulated)")
         yield lambda time: None
         return
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
@@ -26,8 +30,11 @@ def simulated_time(name: str, duration: float) -> Iterator[Callable[[float], Non
 
 
 @contextmanager
-def counted(name: str, total: int, done: int) -> Iterator[Callable[[str], None]]:
-    """Progress of `total` items, `done` of them before the start; the callable takes a word on each finished item."""
+def counted(name: str, total: int, done: int = 0, *, log: bool = False) -> Iterator[Callable[[str], None]]:
+    """Progress of `total` items, `done` of them before the start; the callable takes a word on each finished item.
+
+    `log`: without a terminal, a line for each item.
+    """
     console = Console(stderr=True)
     if not console.is_terminal:
         count = done
@@ -35,7 +42,8 @@ def counted(name: str, total: int, done: int) -> Iterator[Callable[[str], None]]
         def line(word: str) -> None:
             nonlocal count
             count += 1
-            say(f"{name}: {count}/{total} {word}")
+            if log:
+                say(f"{name}: {count}/{total} {word}")
 
         yield line
         return

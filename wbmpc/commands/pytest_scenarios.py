@@ -18,9 +18,10 @@ from wbmpc.commands.annotations import Annotation, annotations_of_problems, anno
 from wbmpc.commands.ci import Entry, annotations_of, append_summary, entry_of
 from wbmpc.commands.exits import ExitCode
 from wbmpc.commands.one_run import Job, Outcome, carry_out
-from wbmpc.commands.run import RunOptions, jobs_of, make_folder
+from wbmpc.commands.run import RunOptions, jobs_of
 from wbmpc.commands.tables import checks_table, plain_text
 from wbmpc.errors import ScenarioError, WbmpcError
+from wbmpc.files import make_folder
 from wbmpc.scenario import parse_overrides
 from wbmpc.scenario.text_file import MAX_BYTES
 from wbmpc.scenario.yaml_reader import read_document

@@ -49,6 +49,7 @@ def render(recording: Path, target: Path, options: RenderOptions) -> ExitCode:
     camera = pictures.Camera(azimuth=options.azimuth, elevation=options.elevation, distance=options.distance)
     picture = pictures.Picture(width=width, height=height, camera=camera)
     if animated:
+        pictures.prepare_animation(target, frame_rate=options.rate)
         times = animation_times(footage, options)
         frames = pictures.render_frames(footage, times, picture)
         pictures.save_animation(frames, target, frame_rate=options.rate)

@@ -16,6 +16,7 @@ from wbmpc.commands.progress import counted, simulated_time
 from wbmpc.commands.summary import print_runs
 from wbmpc.commands.tables import cause_lines, print_checks, timing_line
 from wbmpc.errors import WbmpcError
+from wbmpc.files import make_folder
 from wbmpc.golden import Golden, read_golden
 from wbmpc.junit import write_junit
 from wbmpc.pool import Died, available_cores, finished
@@ -55,9 +56,9 @@ def run(paths: Sequence[Path], options: RunOptions) -> ExitCode:
     for name in names:
         if names.count(name) > 1:
             raise WbmpcError(f"two scenarios are named {name!r}: their results would overwrite each other")
-    make_folder(options.out)
     if options.write_golden is not None:
         make_folder(options.write_golden, "--write-golden")
+    make_folder(options.out)
     if viewer := _viewer(options):
         jobs = [replace(job, viewer=viewer) for job in jobs]
     for job in jobs:
@@ -122,14 +123,6 @@ def _golden_file(scenario: Scenario, folder: Path | None) -> Path | None:
     return None if folder is None else folder / f"{scenario.name}.json"
 
 
-def make_folder(folder: Path, option: str = "--out") -> None:
-    """Make an output folder. Raises WbmpcError when that is impossible."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise WbmpcError(f"{option} {folder}: {error.strerror}") from None
-
-
 def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, Outcome], None, None]:
     """Index and outcome of every run, as they finish."""
     if len(jobs) == 1:
@@ -137,7 +130,7 @@ def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, 
         # whatever exit code the command returns.
         import wbmpc.session  # noqa: F401
 
-        with simulated_time(jobs[0].name, jobs[0].scenario.duration) as on_progress:
+        with simulated_time(jobs[0].name, jobs[0].scenario.duration, log=True) as on_progress:
             outcome = carry_out(jobs[0], on_progress)
         yield 0, outcome
         return
@@ -146,7 +139,7 @@ def _outcomes(jobs: Sequence[Job], options: RunOptions) -> Generator[tuple[int, 
     if processes > 1:  # longest first: a long run that begins last would keep one core busy and the others waiting
         order.sort(key=lambda k: -jobs[k].scenario.duration)
     with (
-        counted("runs", len(jobs), 0) as advance,
+        counted("runs", len(jobs), log=True) as advance,
         closing(finished(carry_out, [jobs[k] for k in order], jobs=processes)) as results,
     ):
         for place, result in results:

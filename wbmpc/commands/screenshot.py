@@ -6,6 +6,7 @@ from pathlib import Path
 
 from wbmpc.commands.exits import ExitCode
 from wbmpc.errors import WbmpcError
+from wbmpc.files import prepare, writing
 from wbmpc.rerun_sink.viewer import headless_viewer
 
 FORMATS = (".png", ".webp")
@@ -22,6 +23,7 @@ def screenshot(
     suffix = target.suffix.lower()
     if suffix not in FORMATS:
         raise WbmpcError(f"{target}: unknown kind of picture; choose one of {', '.join(FORMATS)}")
+    prepare(target)
     width, height = size
     with headless_viewer(recording, width=width, height=height) as viewer:
         if tab is not None:
@@ -29,10 +31,7 @@ def screenshot(
         if moment is not None:
             viewer.go_to(moment)
         picture = viewer.picture(view)
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with writing(target):
         picture.save(target, **({"quality": 85, "method": 6} if suffix == ".webp" else {"optimize": True}))
-    except OSError as error:
-        raise WbmpcError(f"cannot write the picture {target}: {error.strerror or error}") from error
     print(target)
     return ExitCode.PASSED

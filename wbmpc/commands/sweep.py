@@ -17,9 +17,9 @@ from wbmpc.checks.settings import UniversalSettings
 from wbmpc.commands.exits import ExitCode, say
 from wbmpc.commands.progress import counted
 from wbmpc.commands.reproduce import run_command
-from wbmpc.commands.run import make_folder
 from wbmpc.commands.tables import console, number
 from wbmpc.errors import WbmpcError
+from wbmpc.files import make_folder
 from wbmpc.pool import available_cores
 from wbmpc.scenario import load_scenario, robot_path
 from wbmpc.sweep import Draw, draw_values, header_of, run_draws, scenario_of, severity
@@ -52,7 +52,7 @@ def sweep(path: Path, options: SweepOptions) -> ExitCode:
     """
     scenario = load_scenario(path, options.overrides)
     if scenario.sweep is None:
-        raise WbmpcError(f"{path}: the scenario declares no sweep")
+        raise WbmpcError(f"{path}: the scenario declares no sweep (the key sweep.variations)")
     variations = scenario.sweep.variations
     draws = []
     for index in range(options.draws):
@@ -67,7 +67,7 @@ def sweep(path: Path, options: SweepOptions) -> ExitCode:
     if done:
         say(f"{done} of {options.draws} draws are done already, going on")
     jobs = options.jobs or available_cores()
-    with counted(scenario.name, options.draws, done) as advance:
+    with counted(scenario.name, options.draws, done, log=True) as advance:
         rows = run_draws(draws, journal, jobs=jobs, on_done=lambda row: advance(_word(row)))
     document = summary(scenario.name, options.seed, rows, header)
     write_json(options.out / f"{scenario.name}.sweep.json", document)

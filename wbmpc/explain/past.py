@@ -37,6 +37,17 @@ class Past:
         """Of the run."""
         return Robot.load(Path(self.run.scenario.robot))
 
+    def tick_at(self, time: float) -> int:
+        """Number of the tick at `time` [s].
+
+        Raises:
+            WbmpcError: it is not in the recording.
+        """
+        step, ticks = self.run.scenario.loop.timestep, self.run.run.schedule.ticks
+        if not 0.0 <= time < (ticks - 0.5) * step:  # nan is not, either
+            raise WbmpcError(f"--at {time:g}: outside the recording, which goes from 0 to {(ticks - 1) * step:g} s")
+        return round(time / step)
+
     def index_at(self, time: float) -> int:
         """Number of the latest plan whose snapshot is not later than `time` [s].
 

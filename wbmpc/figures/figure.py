@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from wbmpc.errors import WbmpcError
 from wbmpc.figures.panels import HANDS, Band, Curve, Ink, Note, Outline, Panel, panels_of
 from wbmpc.figures.trace import Trace
+from wbmpc.files import writing
 from wbmpc.rerun_sink import palette
 
 WIDTH = 9.5  # [in]
@@ -59,12 +60,9 @@ def save_figure(figure: Figure, path: Path) -> None:
     """
     if path.suffix.lower() not in FORMATS:
         raise WbmpcError(f"{path}: unknown kind of figure; choose one of {', '.join(FORMATS)}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with writing(path):
         options: dict[str, Any] = {"pil_kwargs": {"lossless": True}} if path.suffix.lower() == ".webp" else {}
         figure.savefig(path, **options)
-    except OSError as error:
-        raise WbmpcError(f"cannot write the figure {path}: {error.strerror or error}") from error
 
 
 def _draw(axes: Any, item: Curve | Band | Outline | Note) -> None:

@@ -68,6 +68,7 @@ class Run:
     experiments: Mapping[str, Counterfactual] = field(default_factory=dict)  # that the scenario declares
     commands: Sequence[tuple[str, str]] = ()  # what each is for, and how to repeat the run with it
     notes: Sequence[str] = ()  # what is missing here, and why
+    undrawn: str = ""  # why there are no pictures of a motion
     objection: str | None = None  # a counterfactual's: what is wrong with how it ended
     declared: bool = False  # a counterfactual, and what it must lead to is known
 
@@ -113,10 +114,7 @@ def read_run(source: Source, *, animation: bool) -> tuple[Run | None, list[Unrea
     if source.recording is not None:
         try:
             recording = Recording(source.recording)
-            if not recording.static("/model", "mjb"):
-                raise WbmpcError(f"{source.recording}: not a recording of wbmpc (it holds no model)")
         except WbmpcError as error:
-            recording = None
             unreadable.append(Unreadable(source.recording, str(error).removeprefix(f"{source.recording}: ")))
     if recording is None and source.verdict is None:
         return None, unreadable
@@ -199,7 +197,7 @@ def _with_recording(run: Run, recording: Recording, *, animation: bool) -> Run:
     try:
         return replace(run, pictures=pictures_of(footage, trace, animation=animation))
     except WbmpcError as error:
-        return replace(run, notes=[*run.notes, f"No pictures: {error}."])
+        return replace(run, undrawn=str(error), notes=[*run.notes, f"No pictures: {error}."])
 
 
 def _firings(recording: Recording) -> Iterable[Firing]:

@@ -7,10 +7,12 @@ latest row at or before the sample.
 from __future__ import annotations
 
 import struct
-import tempfile
 import warnings
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import mujoco
@@ -45,6 +47,8 @@ class Recording:
                 if ":" in name or chunk.is_static:
                     rows = self._rows.setdefault((chunk.entity_path, name.rsplit(":", 1)[-1]), [])
                     rows.append((stamps, values))
+        if not self.static("/model", "mjb"):  # the first that a run writes
+            raise WbmpcError(f"{path}: not a recording of wbmpc (it holds no model)")
 
     def column(self, entity: str, component: str) -> tuple[FloatArray, list[NDArray[Any]]]:
         """Times (n,) [s] and the n values of a component, in order of time: `column("/state/qpos", "scalars")`."""
@@ -82,7 +86,7 @@ class Recording:
         """Everything that pictures need.
 
         Raises:
-            WbmpcError: the file holds no model or no sample, or another MuJoCo release wrote the model.
+            WbmpcError: the file holds no sample, or another MuJoCo release wrote the model.
         """
         model = self._model()
         time, qpos = self.column("/state/qpos", "scalars")
@@ -115,8 +119,6 @@ class Recording:
 
     def _model(self) -> Any:
         packed, release = self.static("/model", "mjb"), self.static("/model", "mujoco")
-        if not packed:
-            raise WbmpcError(f"{self.path}: not a recording of wbmpc (it holds no model)")
         if release != [mujoco.__version__]:
             raise WbmpcError(
                 f"{self.path}: written with MuJoCo {release[0]}, this is {mujoco.__version__}; run it anew"
@@ -126,35 +128,41 @@ class Recording:
 
 def _chunks(path: Path) -> list[Any]:
     if not path.is_file():
-        raise WbmpcError(f"no such recording: {path}")
-    with warnings.catch_warnings():
+        raise WbmpcError(f"{path}: a folder, not a recording" if path.is_dir() else f"no such recording: {path}")
+    with whole_messages(path) as whole, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # a killed run's file has no footer, which is no trouble here
         try:
-            return list(RrdReader(path).stream().to_chunks())
+            return list(RrdReader(whole).stream().to_chunks())
         except (RuntimeError, ValueError) as error:
-            whole = _whole_messages(path.read_bytes())
-            if not whole:
-                raise WbmpcError(f"{path}: not a readable recording ({str(error).splitlines()[0]})") from error
-        with tempfile.TemporaryDirectory() as folder:
-            repaired = Path(folder) / "repaired.rrd"
-            repaired.write_bytes(whole)
-            try:
-                return list(RrdReader(repaired).stream().to_chunks())
-            except (RuntimeError, ValueError) as error:
-                raise WbmpcError(f"{path}: not a readable recording ({str(error).splitlines()[0]})") from error
+            reason = str(error).splitlines()[0].removeprefix(f"Failed to read RRD file at {whole}: ")
+            raise WbmpcError(f"{path}: not a readable recording ({reason})") from error
+
+
+@contextmanager
+def whole_messages(path: Path) -> Iterator[Path]:
+    """The file, or a copy without the message that a kill cut short, for which strict readers refuse the whole file."""
+    content = path.read_bytes()
+    end = _end_of_messages(content)
+    if end in (0, len(content)):
+        yield path
+        return
+    with TemporaryDirectory() as folder:
+        copy = Path(folder) / path.name
+        copy.write_bytes(content[:end])
+        yield copy
 
 
 _FILE_HEADER, _MESSAGE_HEADER = 12, struct.Struct("<QQ")  # kind and length of the payload that follows
 
 
-def _whole_messages(content: bytes) -> bytes:
-    """`content` without the message that a kill cut short, which the strict reader refuses; empty when not a .rrd."""
+def _end_of_messages(content: bytes) -> int:
+    """Where the last message ends that is there to its end; 0 when `content` is not of a .rrd."""
     if not content.startswith(b"RRF2"):
-        return b""
+        return 0
     end = _FILE_HEADER
     while end + _MESSAGE_HEADER.size <= len(content):
         _, length = _MESSAGE_HEADER.unpack_from(content, end)
         if end + _MESSAGE_HEADER.size + length > len(content):
             break
         end += _MESSAGE_HEADER.size + length
-    return content[:end]
+    return end

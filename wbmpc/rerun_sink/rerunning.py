@@ -71,17 +71,12 @@ def recorded_run(recording: Recording) -> RecordedRun:
     """
     text = recording.static(_RUN, "run")
     if not text:
-        of_ours = recording.static("/model", "mjb")
-        reason = (
-            "holds no schedule of plans (an interactive run cannot be made again)"
-            if of_ours
-            else "not a recording of wbmpc (it holds no run)"
-        )
-        raise WbmpcError(f"{recording.path}: {reason}")
+        raise WbmpcError(f"{recording.path}: holds no schedule of plans (an interactive run cannot be made again)")
     _, hashes = recording.column(_PROGRESS, "state_sha256")
     if not hashes:
         raise WbmpcError(
-            f"{recording.path}: no tick is in it; a real-time run is written when it ends, one that was killed is lost"
+            f"{recording.path}: no tick is in it: it was cut short before the end of the first block of ticks "
+            "(of a real-time run there is only one, written when it ends)"
         )
     sums = np.concatenate(recording.column(_PROGRESS, "checksums")[1])
     snapshots, effects = (

@@ -14,6 +14,7 @@ import numpy as np
 import rerun as rr
 
 from wbmpc.errors import WbmpcError
+from wbmpc.files import writing
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink.blueprint import KEY, KEY_TEXT, layout
 from wbmpc.rerun_sink.branching import BRANCH, write_branch
@@ -205,13 +206,10 @@ def _open(recording: Any, target: Path | str, model: Any) -> None:
     if isinstance(target, str):
         recording.connect_grpc(target, default_blueprint=blueprint)
         return
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
+    with writing(target):
         target.unlink(missing_ok=True)
         with _begun(target).open("wb"):  # rerun reports an unwritable file from a thread of its own, too late
             pass
-    except OSError as error:
-        raise WbmpcError(f"cannot write the recording {target}: {error.strerror}") from error
     recording.save(_begun(target), default_blueprint=blueprint)
 
 

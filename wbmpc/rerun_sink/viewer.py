@@ -20,6 +20,7 @@ from PIL import Image
 from rerun.experimental import ViewerClient
 
 from wbmpc.errors import WbmpcError
+from wbmpc.rerun_sink.reading import Recording, whole_messages
 from wbmpc.rerun_sink.stream import TIMELINE
 
 _PATIENCE = 90.0  # [s] for the viewer to start, and for a recording to be there: drawing in software is slow
@@ -36,8 +37,9 @@ class Viewer:
     def __init__(self, client: Any, alive: Callable[[], None], path: Path) -> None:
         """Show `path` and wait until it is loaded; `alive` raises when the viewer has ended."""
         self._client, self._alive, self._path = client, alive, path
-        client.open(str(path.resolve()))
-        self._recording = self._patiently(self._loaded)
+        with whole_messages(path) as whole:  # the viewer waits for ever for the rest of one that was cut short
+            client.open(str(whole.resolve()))
+            self._recording = self._patiently(self._loaded)
         # What says nothing of the run takes no room: the bar above with its warnings.
         self._change(
             lambda blueprint: blueprint.setdefault("/top_panel", {}).update(PanelBlueprint={"state": "Hidden"})
@@ -119,11 +121,10 @@ def headless_viewer(path: Path, *, width: int, height: int) -> Iterator[Viewer]:
     """A viewer of `width` by `height` [px] with the recording `path` open; ended with the context.
 
     Raises:
-        WbmpcError: no such file, the viewer does not start (it needs Vulkan, in software if need be), or it does not
-            load the file.
+        WbmpcError: no recording of this project, or the viewer does not start (it needs Vulkan, in software if need be)
+            or does not load the file.
     """
-    if not path.is_file():
-        raise WbmpcError(f"no such recording: {path}")
+    Recording(path)  # the viewer would not say what is wrong with it
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]

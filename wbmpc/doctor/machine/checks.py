@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from wbmpc.doctor.check import Check, Finding, examine
 from wbmpc.doctor.machine import cores, graphics, software
 
@@ -30,6 +32,6 @@ CHECKS: tuple[Check[None], ...] = (
 )
 
 
-def examine_machine() -> list[Finding]:
+def examine_machine(on_done: Callable[[str], None] | None = None) -> list[Finding]:
     """The finding of every check; takes a few seconds, most of them to try OpenGL."""
-    return examine(CHECKS, None)
+    return examine(CHECKS, None, on_done)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from wbmpc.doctor.check import Check, Finding, examine
@@ -79,6 +80,6 @@ CHECKS: tuple[Check[RobotFile], ...] = (
 )
 
 
-def examine_robot(path: Path) -> list[Finding]:
+def examine_robot(path: Path, on_done: Callable[[str], None] | None = None) -> list[Finding]:
     """The finding of every check of the MJCF at `path`, whatever the file holds."""
-    return examine(CHECKS, RobotFile(path))
+    return examine(CHECKS, RobotFile(path), on_done)
