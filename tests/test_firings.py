@@ -37,6 +37,7 @@ def written(tmp_path: Path, *blocks: Sequence[PlanReport]) -> Recording:
     path = tmp_path / "a.rrd"
     recording = rr.RecordingStream("test")
     recording.save(path)
+    recording.log("/model", rr.AnyValues(mjb=b"a model"), static=True)  # of ours
     log = FiringLog(Stream(recording), {patch.name: patch for patch in (TABLE, WALL)})
     log.describe()
     for block in blocks:
