@@ -61,8 +61,7 @@ class FusedAssembly:
         )
         chains, lengths = chains_of(self._model, frames)
         limits = np.array([robot.joint_lower, robot.joint_upper, robot.joint_speed, robot.torque_limit])
-        self._constants = (chains, lengths, limits, np.array([robot.damping, robot.frictionloss]))
-        self._constants += robot.mass, robot.palm_radius
+        self._constants = (chains, lengths, limits, np.array([robot.damping, robot.frictionloss]), robot.mass)
         self._com_integral, self._hand_integral, self._sensed = np.zeros(3), np.zeros((2, 3)), np.zeros(2)
         weight = TaskStack(robot, settings, step=step).weight  # constant for CoM, momentum and torso
         assert weight[MOMENTUM].all() or settings.momentum_weight == 0.0

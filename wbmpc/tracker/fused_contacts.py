@@ -32,7 +32,7 @@ def contact_axes(normal, R):  # type: ignore[no-untyped-def]
 
 
 @short_kernel
-def contact_terms(s, g, nj, soles_R, jacobian, palm_radius, palm_force, sensed, qp, terms):  # type: ignore[no-untyped-def]
+def contact_terms(s, g, nj, soles_R, jacobian, palm_force, sensed, qp, terms):  # type: ignore[no-untyped-def]
     """Jacobians, bounds, cones, prices and references of the contact forces: see `PlainAssembly`."""
     rows, x_lower, x_upper = qp[2], qp[5], qp[6]
     contact, rotation, diagonal, reference = terms
@@ -80,10 +80,6 @@ def contact_terms(s, g, nj, soles_R, jacobian, palm_radius, palm_force, sensed, 
                 contact[first + i, k] = (
                     R[0, i] * jacobian[f, 0, k] + R[1, i] * jacobian[f, 1, k] + R[2, i] * jacobian[f, 2, k]
                 )
-                if i < 2:  # where the sphere touches: radius · tangent × normal · turning
-                    j, sign = 1 - i, 2 * i - 1
-                    turning = R[0, j] * jacobian[f, 3, k] + R[1, j] * jacobian[f, 4, k] + R[2, j] * jacobian[f, 5, k]
-                    contact[first + i, k] += sign * palm_radius * turning
             normal_force += palm_force[side, i] * s.hand_normal[side, i]
             x_lower[y + i], x_upper[y + i] = -inf, inf
             diagonal[y + i] = g.hand_force_weight

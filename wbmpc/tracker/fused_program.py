@@ -91,7 +91,7 @@ def build(s_record, g_record, step, state, pin, model, scratch, qp, answer):  # 
     s, g = s_record[0], g_record[0]
     q, v, palm_force, scale = state
     J, M, nle, Jcom, Ag, com, vcom, base_R, base_p, positions, soles_R, torso_R = pin
-    chains, lengths, limits, friction, mass, palm_radius = model
+    chains, lengths, limits, friction, mass = model
     jacobian, twist, drift, tasks, target, weight, clearance, clear_lower = scratch[:8]
     contact, diagonal, reference, row_y, com_integral, hand_integral, sensed = scratch[8:]
     hessian, gradient, rows, lower, upper, x_lower, x_upper = qp
@@ -104,8 +104,7 @@ def build(s_record, g_record, step, state, pin, model, scratch, qp, answer):  # 
     body_tasks(s, g, step, body, frames, tasks, target, weight, com_integral)
     for side in range(2):
         hand_task(s, g, step, side, frames, tasks, target, weight, hand_integral[side])
-    parts = (contact, rotation, diagonal, reference)
-    contact_terms(s, g, nj, soles_R, jacobian, palm_radius, palm_force, sensed, qp, parts)
+    contact_terms(s, g, nj, soles_R, jacobian, palm_force, sensed, qp, (contact, rotation, diagonal, reference))
     clearance_rows(s, g, torso_R, frames, clearance, clear_lower)
     limit_bounds(q, v, limits, g, x_lower, x_upper, torque_lower, torque_upper)
     solve_base(M, nle, scale, contact, base_map, base_offset)

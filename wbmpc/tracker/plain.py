@@ -96,9 +96,7 @@ class PlainAssembly:
                 continue
             R = contact_frame(setpoint.hand_normal[side])
             program.contact_rotation[2 + side] = R
-            jacobian = kinematics.jacobian(self._robot.palm_frames[side])
-            touch = -self._robot.palm_radius * R[:, 2]  # from the palm's centre to where it touches
-            self._contact_jacobian[palm] = R.T @ (jacobian[:3] + np.cross(jacobian[3:], touch, axis=0))
+            self._contact_jacobian[palm] = R.T @ self._tasks.matrix[21 + 3 * side : 24 + 3 * side]
             lower[palm], upper[palm] = -np.inf, np.inf
             sensed = float(palm_force[side] @ setpoint.hand_normal[side])
             self._sensed[side] += SENSED_SHARE * (max(sensed, 0.0) - self._sensed[side])
