@@ -190,7 +190,7 @@ def _list_sets(table: SetTable, terms: Vector, position: Vector, left: Vector, m
 
 @kernel
 def _may_share(terms: Vector, position: Vector, left: Vector, i: int, j: int) -> bool:
-    """Whether two options are of different hands, on different patches, and arms that are not there yet do not cross."""
+    """Whether two options are of different hands, on different patches, and no arm would have to cross the other."""
     if terms[i, HAND] == terms[j, HAND] or terms[i, PATCH] == terms[j, PATCH]:
         return False
     if terms[i, HELD] and terms[j, HELD]:  # they are where they are
