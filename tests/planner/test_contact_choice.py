@@ -290,6 +290,20 @@ def test_arms_do_not_cross() -> None:
 
 
 @pytest.mark.parametrize("backend", [ENUMERATION, "daqp"])
+def test_hands_that_are_there_are_not_lost_for_being_near(backend: str) -> None:
+    """Palms land beside their patches' centres: a pair that is held may be nearer than one that is to be chosen."""
+    near = [Option(patch([0.27, y, 0.20], cap=5.0), hand) for y, hand in ((0.02, LEFT), (-0.02, RIGHT))]
+    held = [Option(option.patch, option.hand, held=True) for option in near]
+    assert choose(LEAN, near, backend=backend).objective == np.inf
+    assert choose(LEAN, [held[0], near[1]], backend=backend).objective == np.inf
+    assert choose(LEAN, held, backend=backend).objective < np.inf
+    stage = workspace(backend, 2)
+    costs = [stage.costs(LEAN, options, [(0, 1)], left=LEFTWARDS)[0][0] for options in (near, held)]
+    assert costs[0] == np.inf
+    assert costs[1] < np.inf
+
+
+@pytest.mark.parametrize("backend", [ENUMERATION, "daqp"])
 def test_a_solve_forgets_the_one_before(backend: str) -> None:
     used, fresh = (make_contact_choice(backend, SLOTS, SETTINGS, mass=MASS) for _ in range(2))
     before = [Option(TABLE, LEFT, held=True), Option(WALL, RIGHT, 0.3), Option(TABLE, RIGHT)]

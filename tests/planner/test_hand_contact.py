@@ -171,6 +171,45 @@ def test_the_descent_finds_a_surface_that_is_not_where_it_was_said_to_be(height:
     assert max(abs(v[2]) for v in bench.velocities[-3:-1]) <= SETTINGS.touch_speed + 1e-12  # bounds the impact
 
 
+def test_a_force_acts_where_the_palm_touches() -> None:
+    """The patch's centre says where until then; a palm that lands beside it, or rolls on, says it itself."""
+    bench, beside = Bench(surface=0.19), np.array([-0.024, 0.003, 0.0])
+    assert bench.contact.grip is None
+    bench.choose()
+    while not bench.contact.touching:
+        assert bench.contact.grip is PATCH
+        bench.palm = bench.palm + (beside if bench.pressing else 0.0)
+        bench.step()
+    touched = np.array([*(PATCH.position + beside)[:2], 0.19])
+    grip = bench.contact.grip
+    assert grip is not None
+    assert_allclose(grip.position, touched, atol=1e-9)
+    assert (grip.name, grip.friction, grip.force_cap) == (PATCH.name, PATCH.friction, PATCH.force_cap)
+    assert_allclose(grip.normal, PATCH.normal)
+    rolled = bench.palm + np.array([0.004, 0.0, 0.0])
+    for palm, expected in ((rolled, touched + np.array([0.004, 0.0, 0.0])), (bench.palm, touched)):
+        bench.palm, bench.stuck = palm, True
+        bench.step()
+        grip = bench.contact.grip
+        assert grip is not None
+        assert_allclose(grip.position, expected, atol=1e-9)
+    assert_allclose(bench.contact.reference()[0], bench.palm)  # the palm is held where it touched first
+    assert bench.contact.patch is PATCH
+
+
+def test_a_palm_on_a_wall_touches_it_at_its_side() -> None:
+    wall = PatchPose("side", "wall", np.array([0.1, 0.25, 0.2]), np.array([0.0, -1.0, 0.0]), 0.5, 20.0)
+    contact = HandContact(0, SETTINGS, palm_radius=RADIUS)
+    contact.choose(wall, palm=HOME, palm_velocity=np.zeros(3))
+    contact.phase = LOADED
+    contact.advance(
+        DT, palm=np.array([0.11, 0.236, 0.19]), palm_velocity=np.zeros(3), force=np.array([0.0, -5.0, 0.0]),
+        wanted_force=5.0, needed=True, quiet=False, urgency=0.0, home=HOME,
+    )  # fmt: skip
+    assert contact.grip is not None
+    assert_allclose(contact.grip.position, [0.11, 0.251, 0.19], atol=1e-12)
+
+
 def test_a_surface_that_is_not_there_fails_after_the_search() -> None:
     bench = Bench(surface=None)
     bench.choose()

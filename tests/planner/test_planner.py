@@ -92,11 +92,17 @@ def test_every_report_of_a_candidate_says_why_it_lost() -> None:
 
 
 def test_plans_with_a_contact_balance_under_newton_euler() -> None:
-    """At every knot, the feet's pressure for the planned motion and the planned hand force lies on the soles."""
-    position = {p.name: p.position for p in resolve_patches(REACH)}["table_right_1"]
-    loaded = [plan for plan in far_reach().plans if plan.report.contact_phase[1] == ContactPhase.LOADED]
+    """At every knot, the feet's pressure for the planned motion and the planned hand force lies on the soles.
+
+    The force acts where the palm is, which is not the patch's centre.
+    """
+    centre = {p.name: p.position for p in resolve_patches(REACH)}["table_right_1"]
+    result, below = far_reach(), np.array([0.0, 0.0, ROBOT.palm_radius])
+    loaded = [k for k, report in enumerate(result.reports) if report.contact_phase[1] == ContactPhase.LOADED]
     assert len(loaded) > 200
-    for plan in loaded[::40]:
+    for k in loaded[::40]:
+        plan, position = result.plans[k], result.palms[k - 1][1] - below
+        assert np.linalg.norm((position - centre)[:2]) > 5e-3
         states, report = plan.com_states, plan.report
         for knot in range(len(report.com)):
             zmp = centre_of_pressure(

@@ -56,12 +56,13 @@ def test_each_force_stays_under_its_cap_where_one_alone_would_not() -> None:
 
 
 def test_plans_on_two_hands_balance_under_newton_euler() -> None:
-    position = {p.name: p.position for p in resolve_patches(LEAN)}
-    held = [plan for plan in leaning().plans if (plan.report.contact_phase == P.LOADED).all()]
+    """The forces act where the palms are."""
+    result, below = leaning(), np.array([0.0, 0.0, ROBOT.palm_radius])
+    held = [k for k, report in enumerate(result.reports) if (report.contact_phase == P.LOADED).all()]
     assert len(held) > 200
-    for plan in held[::50]:
-        states, report = plan.com_states, plan.report
-        points = np.array([position[name] for name in report.contact_patch])
+    for k in held[::50]:
+        states, report = result.plans[k].com_states, result.reports[k]
+        points = result.palms[k - 1] - below
         for knot in range(len(report.com)):
             zmp = centre_of_pressure(
                 mass=ROBOT.mass,

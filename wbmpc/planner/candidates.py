@@ -237,9 +237,10 @@ class Candidates:
             key, reach = id(candidate), reaches[id(candidate)]
             goal = candidate.goal(self._robot.palm_radius).position
             distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
-            if any(option.patch is candidate.patch and option.hand == candidate.hand for option in held):
+            takers = [option.hand for option in held if option.patch.name == candidate.patch.name]
+            if candidate.hand in takers:
                 reasons[key] = "held already"
-            elif any(option.patch is candidate.patch for option in held):
+            elif takers:
                 reasons[key] = "patch is in use"
             elif engaged[candidate.hand]:
                 reasons[key] = engaged[candidate.hand]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -30,7 +30,7 @@ CROSSING_GAP = 0.05  # [m] by which the left hand's contact is to the left of th
 class Option:
     """One hand on one patch."""
 
-    patch: PatchPose
+    patch: PatchPose  # its position: where the force acts, of a palm that touches its own (`HandContact.grip`)
     hand: int  # side index
     price: float = 0.0  # [cost] w_i of taking it
     held: bool = False  # taken already: H_i = 1
@@ -54,7 +54,8 @@ class ContactChoice:
                 1 ≤ Σ_i H_i ≤ most,    H_i = 1 for a contact that is held,
                 Σ H_i ≤ 1              over the options of one hand, and over those of one patch,
                 y_i ≥ y_j + gap        when H_i = H_j = 1, i of the left hand, j of the right, y to the left (big-M):
-                                       arms that cross would run into each other.
+                                       arms that cross would run into each other; two that are held are where they
+                                       are, and no contact is lost for it.
 
     The paper takes ΣH = 1; here several contacts share what is needed, and one that is held can be joined by another.
     A further contact pays its own w_i: it is taken when those before it cannot give what is needed, or when sharing the
@@ -89,6 +90,9 @@ class ContactChoice:
             left: (2,) unit vector to the robot's left.
         """
         self.pose(need, options, left=left)
+        return self._answer(options)
+
+    def _answer(self, options: Sequence[Option]) -> Choice:
         solution, forces, knots = self._workspace.solve(), self._forces, self._knots
         if solution.status != SolveStatus.SOLVED:
             return Choice((), np.zeros((len(options), knots, 3)), np.inf, solution)
@@ -134,9 +138,11 @@ class ContactChoice:
         """
         answers = []
         for members in sets:
-            choice = self.solve(need, [replace(options[i], held=True) for i in members], left=left)
-            price = sum(options[i].price for i in members if not options[i].held)
-            answers.append((choice.objective + price, choice.forces))
+            chosen = [options[i] for i in members]
+            self.pose(need, chosen, left=left)
+            self.problem.x_lower[self._forces : self._forces + len(chosen)] = 1.0
+            choice = self._answer(chosen)
+            answers.append((choice.objective, choice.forces))
         return answers
 
     def _fill(self, i: int, option: Option, need: Need) -> None:
@@ -162,12 +168,13 @@ class ContactChoice:
         qp, first, binaries = self.problem, self._sums, slice(self._forces, self._forces + len(options))
         qp.matrix[first, binaries] = 1.0
         qp.lower[first], qp.upper[first] = 1.0, self._settings.most_contacts
-        # Σ_left (y − M) H − Σ_right (y + M) H ≥ gap − 2 M says nothing unless both hands are taken
-        across = np.array([option.patch.position[:2] @ left for option in options])
-        big = float(np.abs(across).max(initial=0.0)) + CROSSING_GAP
-        signs = np.array([1.0 if option.hand == 0 else -1.0 for option in options])
-        qp.matrix[first + 1, binaries] = signs * across - big
-        qp.lower[first + 1], qp.upper[first + 1] = CROSSING_GAP - 2.0 * big, np.inf
+        if sum(option.held for option in options) < len(SIDES):
+            # Σ_left (y − M) H − Σ_right (y + M) H ≥ gap − 2 M says nothing unless both hands are taken
+            across = np.array([option.patch.position[:2] @ left for option in options])
+            big = float(np.abs(across).max(initial=0.0)) + CROSSING_GAP
+            signs = np.array([1.0 if option.hand == 0 else -1.0 for option in options])
+            qp.matrix[first + 1, binaries] = signs * across - big
+            qp.lower[first + 1], qp.upper[first + 1] = CROSSING_GAP - 2.0 * big, np.inf
         of_hand = [[option.hand == side for option in options] for side in range(len(SIDES))]
         patches = {id(option.patch): option.patch for option in options}.values()
         of_patch = [[option.patch is patch for option in options] for patch in patches]

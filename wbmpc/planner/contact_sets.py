@@ -190,9 +190,11 @@ def _list_sets(table: SetTable, terms: Vector, position: Vector, left: Vector, m
 
 @kernel
 def _may_share(terms: Vector, position: Vector, left: Vector, i: int, j: int) -> bool:
-    """Whether two options are of different hands, on different patches, and arms would not cross."""
+    """Whether two options are of different hands, on different patches, and no arm would have to cross the other."""
     if terms[i, HAND] == terms[j, HAND] or terms[i, PATCH] == terms[j, PATCH]:
         return False
+    if terms[i, HELD] and terms[j, HELD]:  # they are where they are
+        return True
     gap = 0.0  # from j's patch to i's, to the left
     for axis in range(2):
         gap += (position[i, axis] - position[j, axis]) * left[axis]

@@ -88,7 +88,7 @@ class Contacts:
     @property
     def points(self) -> list[Vector | None]:
         """Where each hand's contact force acts (3,) in world [m]; None without a contact."""
-        return [c.patch.position if c.patch else None for c in self.hands]
+        return [grip.position if grip else None for grip in (c.grip for c in self.hands)]
 
     def name(self, side: int) -> str:
         """The patch of a hand's contact, "" when none."""
@@ -286,7 +286,7 @@ class Contacts:
             self.forces = np.zeros_like(self.forces)
             return NOT_RUN
         begin = perf_counter()
-        forces, solution = self._force_stage.solve(need, [c.patch for c in self.hands], caps)
+        forces, solution = self._force_stage.solve(need, [c.grip for c in self.hands], caps)
         if forces is not None:
             self.forces = forces
         return StageReport(solution.status, perf_counter() - begin, solution.iterations)
@@ -294,4 +294,4 @@ class Contacts:
 
 def _options(contacts: list[HandContact]) -> list[Option]:
     """Contacts as stage 3 knows them: their prices are paid."""
-    return [Option(c.patch, c.side, held=True) for c in contacts if c.patch is not None]
+    return [Option(grip, c.side, held=True) for c in contacts if (grip := c.grip) is not None]

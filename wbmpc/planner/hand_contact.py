@@ -39,6 +39,7 @@ class HandContact:
         self._path: HandPath | None = None
         self._sigma, self._duration, self._rate = 0.0, 1.0, 1.0
         self._touched = np.zeros(3)
+        self._palm = np.zeros(3)  # [m] measured at the last plan
         self._unloaded_clock = 0.0
         self._urgency = 0.0  # 0 … 1, now
         self._pace = Pace.of(settings, 0.0)  # of the present approach
@@ -95,6 +96,17 @@ class HandContact:
         """The same for a posture, with the surface's normal."""
         goal = self.goal
         return None if goal is None or self.patch is None else PalmTarget(goal, self.patch.normal)
+
+    @property
+    def grip(self) -> PatchPose | None:
+        """The contact as stage 3 and the ZMP know it: the patch, its position where the force acts.
+
+        That is the patch's centre until the palm touches, and from then on where the palm, a sphere, is measured to
+        touch; None without a contact.
+        """
+        if self.patch is None or not self.touching:
+            return self.patch
+        return replace(self.patch, position=self._palm - self._radius * self.patch.normal)
 
     def reference(self) -> tuple[Vector, Vector, Vector]:
         """Palm position, velocity and acceleration (3,) to follow now; only when busy."""
@@ -196,7 +208,7 @@ class HandContact:
             "missing" when there is nothing where the contact should be, "unreached" when the palm did not get there,
             else None.
         """
-        self._urgency = urgency
+        self._urgency, self._palm = urgency, palm
         if not self.busy or self.patch is None:
             return None
         settings, phase = self._settings, self.phase
