@@ -7,7 +7,7 @@ from typing import Any
 from wbmpc.loop import Session
 from wbmpc.planner.plan import Plan
 from wbmpc.planner.planner import Planner
-from wbmpc.pool import Died, Worker
+from wbmpc.pool import Died, Worker, available_cores
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world, robot_path
@@ -30,7 +30,8 @@ class PlannerProcess:
         Raises:
             RuntimeError: the process has ended instead.
         """
-        self._worker: Worker[Any, Any] = Worker(_serve, 0, scenario)
+        # On a machine of one core the ticks need what waiting would take.
+        self._worker: Worker[Any, Any] = Worker(_serve, 0, scenario, awake=available_cores() > 1)
         self._answer()
 
     def order(self, move: TargetMove) -> None:

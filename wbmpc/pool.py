@@ -13,11 +13,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection, wait
+from time import perf_counter
 from typing import Any, Generic, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+AWAKE = 0.05  # [s] to wake a core that sleeps takes up to a millisecond
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # variables that BLAS libraries read at their import
 
 
@@ -88,12 +90,13 @@ def finished(
 class Worker(Generic[Item, Result]):
     """One process and the item that it works on; what it is given next finds the process as the last item left it."""
 
-    def __init__(self, work: Callable[[Item], Result], index: int, item: Item) -> None:
+    def __init__(self, work: Callable[[Item], Result], index: int, item: Item, *, awake: bool = False) -> None:
+        """`awake`: between two items the process keeps its core busy for up to `AWAKE`."""
         # Spawned, not forked: solver libraries hold threads and locks that do not survive a fork.
         one_thread_each()
         context = get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+        self.process = context.Process(target=_serve, args=(theirs, work, awake), daemon=True)
         # A terminal sends Ctrl-C to all. Blocked from birth in the child, it is for the parent to decide.
         # Python's resource tracker, which comes up with the first process, would unblock it again.
         resource_tracker.ensure_running()
@@ -127,10 +130,13 @@ class Worker(Generic[Item, Result]):
         self.connection.close()
 
 
-def _serve(connection: Connection, work: Callable[[Any], Any]) -> None:
+def _serve(connection: Connection, work: Callable[[Any], Any], awake: bool) -> None:
     """The life of a worker process: an item in, its result or exception out, until the pipe ends."""
     with suppress(EOFError, BrokenPipeError):
         while True:
+            sleep_at = perf_counter() + AWAKE if awake else 0.0
+            while not connection.poll(0.0) and perf_counter() < sleep_at:
+                pass
             item = connection.recv()
             answer, failure = None, None
             try:
