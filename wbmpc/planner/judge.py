@@ -87,7 +87,7 @@ class Judge:
             spent=references.spent(contacts),
             events=events,
         )
-        return Judgement(wish.delta_z, firing, stage3)
+        return Judgement(wish.delta_z.copy(), firing, stage3)
 
     def _goal_need(self, mass: float) -> Need | None:
         """The need where the current task ends, on the feet that will carry it; None without such a task."""

@@ -170,7 +170,7 @@ class Planner:
             com=np.column_stack([motion.com, height.height]) if motion else failed,
             com_acceleration=np.column_stack([motion.acceleration, height.acceleration]) if motion else failed,
             com_height_band=band,
-            zmp=motion.zmp if motion else failed[:, :2],
+            zmp=motion.zmp.copy() if motion else failed[:, :2],  # a report outlives its motion
             support_polygon=gated_support.polygons[0].vertices,
             delta_z=judgement.delta_z,
             hand_reference=gated,
