@@ -100,13 +100,19 @@ def test_the_verdict_is_shown_at_the_end(runs: tuple[RunResult, RunResult, Path,
     assert "No verdict" not in text
 
 
-def test_a_viewer_that_is_closed_ends_no_run(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("default::UserWarning")
+def test_a_viewer_that_is_closed_ends_no_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sink_module, "PATIENCE", 2.0)
     with receiver(tmp_path / "sent.rrd") as (address, process):
         url = viewer_at(address)
-        process.kill()
-        process.wait()
-        result = run_scenario(stand(duration=0.5), name="stand", viewer=url)
-    assert result.recorder.ticks == 500
+
+        def close(time: float = 0.0) -> None:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+        with pytest.warns(UserWarning, match="the viewer shows no more of the run"):
+            result = run_scenario(stand(duration=1.5), name="stand", viewer=url, on_progress=close)
+    assert result.recorder.ticks == 1500
 
 
 def test_ticks_made_during_a_flush_wait_for_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

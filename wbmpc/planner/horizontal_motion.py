@@ -69,7 +69,7 @@ class HorizontalMotion:
         n = preview.steps
         self._preview, self._settings, self._ask = preview, settings, ask_shift
         self._matrices = Matrices(preview.P_ps, preview.P_vs, preview.P_pu, preview.P_vu, preview.P_au)
-        self._unmoved = FreeMotion(np.empty((2, n)), np.empty((2, n)), np.empty((n, 2)), np.empty((n, n)))
+        self._unmoved = FreeMotion(np.zeros((2, n)), np.zeros((2, n)), np.zeros((n, 2)), np.zeros((n, n)))
         back = settings.velocity_cost * preview.P_vu.T @ preview.P_vu
         back += settings.position_cost * preview.P_pu.T @ preview.P_pu
         weights = (settings.velocity_cost, settings.position_cost, settings.zmp_centre_cost, settings.footstep_cost)

@@ -6,7 +6,6 @@ import os
 import re
 import socket
 import sys
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
@@ -61,16 +60,13 @@ def new_viewer() -> str:
 def shown(sink: RerunSink) -> Iterator[None]:
     """Flush a viewer's sink from a thread of its own inside.
 
-    The loop is not held up by a slow viewer, nor ended by one that is gone; it shares its interpreter with this thread.
+    The loop is not held up by a slow viewer; it shares its interpreter with this thread.
     """
     over = Event()
 
     def feed() -> None:
-        try:
-            while not over.wait(PERIOD):
-                sink.flush()
-        except Exception as error:  # of a viewer; it must not cost the run
-            warnings.warn(f"the viewer shows no more of the run: {type(error).__name__}: {error}", stacklevel=1)
+        while not over.wait(PERIOD):
+            sink.flush()
 
     thread = Thread(target=feed, name="viewer", daemon=True)
     thread.start()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -32,13 +33,15 @@ from wbmpc.rerun_sink.ticks import describe_ticks, write_ticks, write_tracker_st
 from wbmpc.rerun_sink.timing import describe_timing, write_plan_timing, write_tick_timing
 
 APPLICATION = "wbmpc"
+PATIENCE = 10.0  # [s] for a viewer to take a block; a file gets all the time it needs
 
 
 class RerunSink:
     """Writes what a recorder holds to `target`; reads the recorder and nothing else.
 
     Args:
-        target: the .rrd file; replaced when it exists, its folder made when it does not. A str is the URL of a viewer.
+        target: the .rrd file; replaced when it exists, its folder made when it does not. A str is the URL of a viewer;
+            one that goes away is warned of, and costs the run nothing.
         model: compiled MjModel of robot and world; kept in the file, so that `wbmpc render` needs nothing else.
         joint_names: (nj,) in the order of the torques.
         scenario_text: the scenario as run, overrides included.
@@ -77,7 +80,8 @@ class RerunSink:
         self._joint_names = joint_names
         self._next_flush = block
         self._ticks_done = self._plans_done = self._events_done = self._timed_done = self._snapshots_done = 0
-        self._closed = False
+        self._closed = self._lost = False
+        self._of_file = isinstance(target, Path)
 
         recording = rr.RecordingStream(APPLICATION)
         _open(recording, target, model)
@@ -101,14 +105,14 @@ class RerunSink:
         self._replayable = replay is not None
         if replay is not None:
             describe_run(self._stream, replay)
-        recording.flush()
+        self._deliver()
         # Only now, with the run's beginning in it: a file of this name is always readable, whenever the run is killed.
         if isinstance(target, Path):
             _begun(target).replace(target)
 
     def flush(self, now: float | None = None) -> None:
         """Write what is new; with `now` [s], only when a block's time has passed (cheap enough for every tick)."""
-        if now is not None and now < self._next_flush:
+        if self._lost or (now is not None and now < self._next_flush):
             return
         if now is not None:
             self._next_flush = now + self._block
@@ -128,8 +132,7 @@ class RerunSink:
         self._timed_done = write_plan_timing(self._stream, recorder.timing, self._timed_done)
         if self._replayable:
             write_progress(self._stream, recorder, first)  # after the plans, which a replay of these ticks needs
-        # Blocking: once this returns the block is in the file, whatever happens to the process.
-        self._stream.recording.flush()
+        self._deliver()
 
     def finish(self, verdict: Mapping[str, Any]) -> None:
         """Write what is left and the verdict (the content of NAME.json), as a text and as the file's properties."""
@@ -162,7 +165,8 @@ class RerunSink:
             try:
                 self.flush()
             finally:
-                self._stream.recording.disconnect()
+                if not self._lost:  # it would wait for the viewer once more
+                    self._stream.recording.disconnect()
 
     def __enter__(self) -> RerunSink:
         return self
@@ -171,6 +175,17 @@ class RerunSink:
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self.close()
+
+    def _deliver(self) -> None:
+        """Wait until the block is in the file, whatever happens to the process then, or until the viewer has it."""
+        if self._of_file:
+            self._stream.recording.flush()
+            return
+        try:
+            self._stream.recording.flush(timeout_sec=PATIENCE)
+        except (RuntimeError, ValueError) as error:  # rerun's words for a viewer that is gone, or does not answer
+            self._lost = True
+            warnings.warn(f"the viewer shows no more of the run: {error}", stacklevel=2)
 
     def _flush_plans(self) -> None:
         recorder = self._recorder
