@@ -17,7 +17,8 @@ from benchmarks.replaced import replaced
 from benchmarks.report import Section, Table
 from benchmarks.stopwatch import timed
 from wbmpc.loop import LoopTiming
-from wbmpc.realtime import PlannerThread, run_realtime
+from wbmpc.planner_process import PlannerProcess
+from wbmpc.realtime import run_realtime
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink import RerunSink
 from wbmpc.robot import Robot
@@ -31,17 +32,17 @@ LOCKSTEP = ("stand", "reach")
 WALL_CLOCK = "reach"  # given one fixed plan, its robot stands
 NOTE = """Lockstep: simulated over wall time, above 1 is faster than real time. Recording: what `Recorder.append` and
 the flushes of the `.rrd` take. Wall clock: ticks that began more than a timestep late, and by how much the run ended
-late. *One fixed plan* is the same loop whose planner thread is asked for nothing after the first plan: what the
+late. *One fixed plan* is the same loop whose planner is asked for nothing after the first plan: what the
 machine and the tick itself miss."""
 
 
 def idle_planner() -> AbstractContextManager[None]:
-    """Inside, no snapshot reaches the planner's thread: the loop follows its first plan."""
+    """Inside, no snapshot reaches the planner: the loop follows its first plan."""
 
-    def ignore(thread: PlannerThread, snapshot: RobotState, orders: Sequence[TargetMove] = ()) -> None:
+    def ignore(planner: PlannerProcess, snapshot: RobotState, orders: Sequence[TargetMove] = ()) -> None:
         """Nothing is asked for."""
 
-    return replaced(PlannerThread, "request", lambda request: ignore)
+    return replaced(PlannerProcess, "request", lambda request: ignore)
 
 
 def lockstep(name: str) -> tuple[Table, bool]:

@@ -1,4 +1,4 @@
-"""The real-time loop: scheduling against a made-up clock, the planner's thread, and a replay in lockstep."""
+"""The real-time loop: scheduling against a made-up clock, planners beside the ticks, and a replay in lockstep."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import gc
 import sys
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from threading import Event, Semaphore, active_count
 from time import perf_counter, sleep
 from types import SimpleNamespace
@@ -21,7 +22,8 @@ from wbmpc import realtime
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.planner import Planner
 from wbmpc.planner_process import PlannerProcess
-from wbmpc.realtime import PlannerThread, run_realtime
+from wbmpc.planner_thread import PlannerThread
+from wbmpc.realtime import run_realtime
 from wbmpc.signals import RobotState
 from wbmpc.timing import LoopTiming, Schedule
 
@@ -235,8 +237,28 @@ def test_mailbox_gives_each_plan_once_and_never_early() -> None:
 
 
 def test_a_planner_that_dies_in_its_process_is_missed() -> None:
-    with PlannerProcess(STAND) as planner:
+    with PlannerProcess(STAND, Mailbox()) as planner:
         planner._worker.process.kill()
-        with pytest.raises(RuntimeError, match=r"the planner is gone: its process was killed by SIGKILL"):
-            planner.solve(RobotState(0.01, ROBOT.home_q, np.zeros(ROBOT.nv), np.zeros((2, 6)), np.zeros((2, 3)), 1.0))
+        planner.request(still(0.01))
+        with pytest.raises(RuntimeError, match=r"snapshot of 0.010 s: .*gone: its process was killed by SIGKILL"):
+            checked_until(planner, lambda: False)
     assert not planner._worker.process.is_alive()
+
+
+def test_what_a_planner_raises_in_its_process_says_on_which_snapshot() -> None:
+    with PlannerProcess(STAND, Mailbox()) as planner:
+        planner.request(replace(still(0.01), q=np.zeros(3)))
+        with pytest.raises(RuntimeError, match=r"snapshot of 0.010 s: ValueError: ") as raised:
+            checked_until(planner, lambda: False)
+    assert isinstance(raised.value.__cause__, ValueError)
+
+
+def still(time: float) -> RobotState:
+    return RobotState(time, ROBOT.home_q, np.zeros(ROBOT.nv), np.zeros((2, 6)), np.zeros((2, 3)), 1.0)
+
+
+def checked_until(planner: PlannerProcess, done: Callable[[], bool]) -> None:
+    give_up = perf_counter() + 60.0
+    while not done():
+        assert perf_counter() < give_up
+        planner.check()

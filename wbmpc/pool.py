@@ -113,6 +113,10 @@ class Worker(Generic[Item, Result]):
         with suppress(BrokenPipeError):  # it died at once: `result` says so
             self.connection.send(item)
 
+    def ready(self) -> bool:
+        """Whether `result` need not wait."""
+        return self.connection.poll(0.0)
+
     def result(self) -> Result | Died:
         try:
             error, value = self.connection.recv()

@@ -1,4 +1,4 @@
-"""The real-time loop: the tick of the lockstep loop against the wall clock, the planner in a thread of its own."""
+"""The real-time loop: the tick of the lockstep loop against the wall clock, the planner beside it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
-from queue import Empty, SimpleQueue
-from threading import Thread
+from contextlib import contextmanager
 from time import perf_counter, sleep
 from typing import Protocol
 
@@ -18,6 +16,7 @@ from wbmpc.loop import FLUSH_TICKS, Session, Sink, no_garbage_collection
 from wbmpc.mailbox import Mailbox
 from wbmpc.planner.plan import Plan
 from wbmpc.planner_process import PlannerProcess
+from wbmpc.planner_thread import PlannerThread
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
 from wbmpc.scenario import Scenario, build_world
@@ -29,7 +28,6 @@ SPIN = 3e-4  # [s] before a deadline in which the tick thread no longer trusts a
 SWITCH_INTERVAL = 1e-4  # [s] after which the tick thread, awake, gets the interpreter back from the planner
 PRIORITY = 10  # of SCHED_FIFO, 1 … 99: before everything ordinary, behind what the system itself does
 WARM_UP_TICKS = 20  # made in a session that is thrown away: first calls load libraries and compile
-_Request = tuple[RobotState, Sequence[TargetMove]]
 
 
 def run_realtime(
@@ -45,8 +43,8 @@ def run_realtime(
 ) -> LoopTiming:
     """Run a scenario against the wall clock; `run_lockstep` has these arguments too, and makes the same ticks.
 
-    The planner's thread computes in a process of its own, or by itself (`loop.realtime_planner`). By itself it shares
-    the interpreter with the ticks, which then wait for each other.
+    The planner has a process of its own, or a thread of this one (`loop.realtime_planner`). A thread shares the
+    interpreter with the ticks, and they wait for each other.
 
     Tick k belongs at `start + k · timestep`. It is never skipped: on a machine that cannot keep up, simulated time lags
     the wall clock, later ticks follow without a pause until the lag is made up, and every tick that begins more than a
@@ -81,7 +79,7 @@ def run_realtime(
 
     def exchange(state: RobotState) -> None:
         """Take the plans that are ready, hand over a snapshot when one is due."""
-        worker.check()
+        planner.check()
         for plan in finished.arrived(state.time):
             snapshot, ready = round(plan.time / step), recorder.ticks
             effect = max(ready, snapshot + delay)
@@ -91,11 +89,10 @@ def run_realtime(
             timing.late_plans += ready - snapshot > max(delay, period)
         if due:
             asked.append(state)
-            worker.request(state, operator.orders() if operator is not None else ())
+            planner.request(state, operator.orders() if operator is not None else ())
 
     with (
-        _planner(scenario, session) as planner,
-        PlannerThread(planner, finished) as worker,
+        _planner(scenario, session, finished) as planner,
         _undisturbed(),
         ahead_of_others() as ahead,
     ):
@@ -121,18 +118,11 @@ def run_realtime(
                     recorder.event(session.plant.time, f"{reason}, run ended")
                     break
         timing.wall_time, timing.simulated_time = perf_counter() - slots.start(timing.ticks), session.plant.time
-    worker.check()
-    timing.skipped_plans = worker.skipped
+    planner.check()
+    timing.skipped_plans = planner.skipped
     if sink is not None:
         sink.flush(session.plant.time)
     return timing
-
-
-class AnyPlanner(Protocol):
-    """A planner, wherever it computes."""
-
-    def order(self, move: TargetMove) -> None: ...
-    def solve(self, state: RobotState) -> Plan: ...
 
 
 class Operator(Protocol):
@@ -145,69 +135,6 @@ class Operator(Protocol):
     def orders(self) -> Sequence[TargetMove]:
         """What the planner is told with its next snapshot; each order is given once."""
         ...
-
-
-class PlannerThread:
-    """Solves on the newest snapshot it was given and posts the plan; a context manager: start on entry, join on exit.
-
-    `request` and `check` belong to the tick thread and never wait for the planner.
-    """
-
-    def __init__(self, planner: AnyPlanner, mailbox: Mailbox) -> None:
-        """`planner` is used by this thread alone from entry to exit; `mailbox` receives its plans."""
-        self._planner, self._mailbox = planner, mailbox
-        self._requests: SimpleQueue[_Request | None] = SimpleQueue()  # None: stop
-        self._thread = Thread(target=self._run, name="planner", daemon=True)
-        self._error: BaseException | None = None
-        self._at = 0.0  # [s] time of the snapshot in work
-        self.skipped = 0  # snapshots that a newer one replaced
-
-    def request(self, snapshot: RobotState, orders: Sequence[TargetMove] = ()) -> None:
-        """Ask for a plan, under new orders. The snapshot must not change afterwards."""
-        self._requests.put((snapshot, orders))
-
-    def check(self) -> None:
-        """Raise a RuntimeError when the planner has raised, from what it raised."""
-        if self._error is not None:
-            what = f"{type(self._error).__name__}: {self._error}"
-            raise RuntimeError(
-                f"the planner's thread ended on the snapshot of {self._at:.3f} s: {what}"
-            ) from self._error
-
-    def __enter__(self) -> PlannerThread:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        self._requests.put(None)
-        self._thread.join()
-
-    def _run(self) -> None:
-        # A thread that only hands over to a process must not wait for a core that this process keeps busy.
-        hands_over = isinstance(self._planner, PlannerProcess)
-        try:
-            with ahead_of_others() if hands_over else nullcontext():
-                while (request := self._newest()) is not None:
-                    snapshot, orders = request
-                    self._at = snapshot.time
-                    for order in orders:
-                        self._planner.order(order)
-                    # Ready is ready: whichever tick comes next may use it.
-                    self._mailbox.post(self._planner.solve(snapshot), available_at=snapshot.time)
-        except BaseException as error:  # a thread cannot raise into another: `check` does
-            self._error = error
-
-    def _newest(self) -> _Request | None:
-        """Wait for a request; of several that wait, the newest, with the orders of all. None: stop."""
-        newest = self._requests.get()
-        while newest is not None:
-            try:
-                following = self._requests.get_nowait()
-            except Empty:
-                break
-            self.skipped += following is not None
-            newest = following if following is None else (following[0], [*newest[1], *following[1]])
-        return newest
 
 
 def _snapshot_of(plan: Plan, asked: deque[RobotState]) -> RobotState:
@@ -227,14 +154,11 @@ def _wait_until(deadline: float) -> float:
     return now - deadline
 
 
-@contextmanager
-def _planner(scenario: Scenario, session: Session) -> Iterator[AnyPlanner]:
-    """Who computes for the planner's thread."""
+def _planner(scenario: Scenario, session: Session, mailbox: Mailbox) -> PlannerThread | PlannerProcess:
+    """Who plans beside the ticks, from entry to exit."""
     if scenario.loop.realtime_planner == "thread":
-        yield session.planner
-        return
-    with PlannerProcess(scenario) as planner:
-        yield planner
+        return PlannerThread(session.planner, mailbox)
+    return PlannerProcess(scenario, mailbox)
 
 
 @contextmanager

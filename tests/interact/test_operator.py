@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import perf_counter
+
 import numpy as np
 import pytest
 from fake_window import FakeWindow
@@ -16,6 +18,8 @@ from wbmpc.interact.controls import Key
 from wbmpc.interact.exchange import Inputs, MousePush
 from wbmpc.interact.operator import Operator
 from wbmpc.loop import Session
+from wbmpc.mailbox import Mailbox
+from wbmpc.planner.plan import Plan
 from wbmpc.planner_process import PlannerProcess
 from wbmpc.realtime import run_realtime
 from wbmpc.recorder import Recorder
@@ -215,11 +219,23 @@ def test_a_moved_target_reaches_the_plans(where: str) -> None:
 def test_orders_of_a_skipped_snapshot_are_kept() -> None:
     """A planner in its process: two orders, one plan."""
     scenario = near_reach(1.0, where="process")
-    still = RobotState(0.01, ROBOT.home_q, np.zeros(ROBOT.nv), np.zeros((2, 6)), np.zeros((2, 3)), 1.0)
-    with PlannerProcess(scenario) as planner:
-        for x in (0.2, 0.21):
-            planner.order(TargetMove(0, np.array([x, 0.1, 0.3])))
-        events = planner.solve(still).report.events
-    assert [e for e in events if "target moved" in e] == [
-        f"reach left: target moved to ({x:.3f}, 0.100, 0.300) m" for x in (0.2, 0.21)
+    still = [
+        RobotState(time, ROBOT.home_q, np.zeros(ROBOT.nv), np.zeros((2, 6)), np.zeros((2, 3)), 1.0)
+        for time in (0.01, 0.02, 0.03, 0.04)
+    ]
+    mailbox, plans = Mailbox(), list[Plan]()
+    with PlannerProcess(scenario, mailbox) as planner:
+        planner.request(still[0])
+        for state, x in zip(still[1:], (0.2, 0.21, 0.22), strict=True):  # none of these waits for the planner
+            planner.request(state, [TargetMove(0, np.array([x, 0.1, 0.3]))])
+        assert mailbox.latest(9.0) is None
+        give_up = perf_counter() + 60.0
+        while len(plans) < 2:
+            assert perf_counter() < give_up
+            planner.check()
+            plans += mailbox.arrived(9.0)
+    assert [plan.report.time for plan in plans] == [0.01, 0.04]
+    assert planner.skipped == 2
+    assert [event for event in plans[1].report.events if "target moved" in event] == [
+        f"reach left: target moved to ({x:.3f}, 0.100, 0.300) m" for x in (0.2, 0.21, 0.22)
     ]

@@ -32,7 +32,7 @@ class LoopSettings(StrictModel):
     )
     realtime_planner: Literal["process", "thread"] = Field(
         default="process",
-        description="Where the planner's thread computes in a real-time run: in a process of its own, or in itself.",
+        description="Where the planner of a real-time run is: in a process of its own, or in a thread beside the ticks.",
     )
 
     @property
