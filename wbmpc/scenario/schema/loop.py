@@ -32,7 +32,7 @@ class LoopSettings(StrictModel):
     )
     realtime_planner: Literal["process", "thread"] = Field(
         default="process",
-        description="Where the planner of a real-time run is: in a process of its own, or in a thread beside the ticks.",
+        description="Where the planner of a real-time run is: in a process of its own, or a thread beside the ticks.",
     )
 
     @property
