@@ -103,6 +103,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         torque_limit=np.full(2, 2.5),
         com=com,
         com_velocity=np.zeros(3),
+        angular_momentum=np.zeros(3),
         palm_position=palm,
         sole_position=sole,
         torso_up=1.0,

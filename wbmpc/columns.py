@@ -26,6 +26,7 @@ _TRUTH: Layout = {
     "torque_limit": (("j",), float),
     "com": ((3,), float),
     "com_velocity": ((3,), float),
+    "angular_momentum": ((3,), float),
     "palm_position": ((2, 3), float),
     "sole_position": ((2, 3), float),
     "torso_up": ((), float),

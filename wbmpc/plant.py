@@ -165,6 +165,7 @@ class Plant:
         external = self._push(time)
         self._physics.subtree_velocity()
         com, com_velocity = d.subtree_com[self._root].copy(), d.subtree_linvel[self._root].copy()
+        angular_momentum = d.subtree_angmom[self._root].copy()
         sites = d.site_xpos.take(self._sites, axis=0)
         sole, palm = sites[:2], sites[2:]
         torso_up = float(d.xmat[self._torso, 8])
@@ -179,6 +180,7 @@ class Plant:
             torque_limit=limit,
             com=com,
             com_velocity=com_velocity,
+            angular_momentum=angular_momentum,
             palm_position=palm,
             sole_position=sole,
             torso_up=torso_up,

@@ -218,6 +218,7 @@ class Truth:
     torque_limit: Vector  # (nj,) [N·m] what the servo could give at this speed, in this direction
     com: Vector  # (3,) [m]
     com_velocity: Vector  # (3,) [m/s]
+    angular_momentum: Vector  # (3,) [N·m·s] of the robot about its CoM, in world
     palm_position: Vector  # (2, 3) [m]
     sole_position: Vector  # (2, 3) [m]
     torso_up: float  # cosine of the torso's tilt: 1 upright, 0 lying

@@ -55,7 +55,7 @@ def write_measured(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], 
     for i, name in enumerate(_VECTORS[: len(SIDES)]):
         stream.scalars(f"/mismatch/{name}/measured", time, palm[:, i])
     stream.scalars(f"{_FEET}/measured", time, sole[:, :, 2].sum(axis=1))
-    middle, rate = momentum.between(time, recorder.qpos[rows], recorder.qvel[rows])
+    middle, rate = momentum.between(time, recorder.com_velocity[rows], recorder.angular_momentum[rows])
     if not len(middle):  # the first sample has none before it
         return
     stream.scalars(f"/mismatch/{_VECTORS[-1]}/measured", middle, rate[:, :3])

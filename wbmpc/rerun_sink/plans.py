@@ -15,7 +15,7 @@ from wbmpc.rerun_sink.stream import Stream
 from wbmpc.signals import SIDES, ContactPhase, PlanReport, SolveStatus
 
 _STAGES = ("stage1", "stage2", "stage3")
-_NOWHERE = np.full(2, np.nan)
+_NOWHERE = np.full((1, 2), np.nan)
 _LEAST_DRAWN_SHIFT = 1e-4  # [m] a shorter ΔZ is solver noise
 
 
@@ -97,7 +97,7 @@ def _write_curves(stream: Stream, plans: Sequence[PlanReport], time: NDArray[np.
     first_knot = time + knot_period
     stream.scalars("/com/z/band", first_knot, [plan.com_height_band[0] for plan in plans])
     zmp, delta_z = np.array([plan.zmp[0] for plan in plans]), np.array([plan.delta_z for plan in plans])
-    support = np.array([_extent(plan.support_polygon) for plan in plans])  # (n, 2, 2) least and greatest
+    support = _extents([plan.support_polygon for plan in plans])
     for i, axis in enumerate("xy"):
         stream.scalars(f"/zmp/{axis}/planned", first_knot, zmp[:, i])
         stream.scalars(f"/zmp/{axis}/support", time, support[:, :, i])
@@ -118,8 +118,11 @@ def _closed(polygons: Sequence[NDArray[np.float64]]) -> tuple[NDArray[np.float64
     return np.concatenate(parts), np.array([len(polygon) + (len(polygon) > 0) for polygon in polygons])
 
 
-def _extent(polygon: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    return (polygon.min(axis=0), polygon.max(axis=0)) if len(polygon) else (_NOWHERE, _NOWHERE)
+def _extents(polygons: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """(n, 2, 2) [m] least and greatest coordinates of each; nan for an empty one."""
+    corners = np.concatenate([part for polygon in polygons for part in (polygon, _NOWHERE)])  # no stretch is empty
+    starts = np.cumsum([0, *(len(polygon) + 1 for polygon in polygons[:-1])])
+    return np.stack([extreme.reduceat(corners, starts, axis=0) for extreme in (np.fmin, np.fmax)], axis=1)
 
 
 @cache

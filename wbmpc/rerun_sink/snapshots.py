@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache, lru_cache
+from operator import attrgetter
 from struct import Struct
 from typing import Any
 
@@ -35,7 +36,7 @@ class RecordedPlan:
 def digest(report: PlanReport) -> str:
     """Of every bit of a plan's report but its wall times: equal for equal plans."""
     parts: list[bytes] = []
-    _gather(report, parts)
+    _gather((report,), parts)
     return hashlib.blake2b(b"".join(parts), digest_size=_DIGEST_BYTES).hexdigest()
 
 
@@ -71,21 +72,21 @@ def recorded_plans(recording: Recording) -> Sequence[RecordedPlan]:
     ]
 
 
-def _gather(value: Any, parts: list[bytes]) -> None:
-    """Append what tells `value` from every other, type by type; floats to the bit."""
-    if isinstance(value, np.ndarray):
-        parts += (_text(value.shape), value.tobytes())
-    elif isinstance(value, float):
-        parts.append(_BITS(value))
-    elif (names := _fields_of(value.__class__)) is not None:
-        for name in names:
-            _gather(getattr(value, name), parts)
-    elif isinstance(value, tuple):
-        parts.append(_text(len(value)))
-        for item in value:
-            _gather(item, parts)
-    else:
-        parts.append(_text(value))
+def _gather(values: Iterable[Any], parts: list[bytes]) -> None:
+    """Append what tells each of `values` from every other, type by type; floats to the bit."""
+    for value in values:
+        kind = value.__class__
+        if kind is np.ndarray:
+            parts += (_text(value.shape), value.tobytes())
+        elif kind is float or kind is np.float64:
+            parts.append(_BITS(value))
+        elif kind is tuple:
+            parts.append(_text(len(value)))
+            _gather(value, parts)
+        elif (fields_of := _fields(kind)) is not None:
+            _gather(fields_of(value), parts)
+        else:
+            parts.append(_text(value))
 
 
 @lru_cache(maxsize=256, typed=True)  # 1, True and an enum's member are not the same
@@ -95,6 +96,6 @@ def _text(value: object) -> bytes:
 
 
 @cache
-def _fields_of(kind: type) -> tuple[str, ...] | None:
-    """Fields of a dataclass that a plan is told by; None: `kind` is none."""
-    return tuple(f.name for f in fields(kind) if f.name not in _WALL_TIMES) if is_dataclass(kind) else None
+def _fields(kind: type) -> Callable[[Any], tuple[Any, ...]] | None:
+    """Gives those fields of a dataclass that a plan is told by; None: `kind` is none."""
+    return attrgetter(*(f.name for f in fields(kind) if f.name not in _WALL_TIMES)) if is_dataclass(kind) else None

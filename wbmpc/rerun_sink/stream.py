@@ -40,6 +40,14 @@ class Column:
         return self.values
 
 
+@dataclass(frozen=True, slots=True)
+class Ragged:
+    """Arrays of different lengths, one after another."""
+
+    values: NDArray[Any]  # (c,)
+    lengths: NDArray[np.integer]  # (n,) whose sum is c
+
+
 class Component:
     """One component of an archetype: its name and memory layout, learnt from a column that rerun has made."""
 
@@ -155,11 +163,13 @@ class Stream:
         column = _STRIP.column(points, _offsets(there), _offsets(lengths[there]))
         self.columns(path, time, [column])
 
-    def values(self, path: str, time: NDArray[np.float64], **values: Sequence[Any] | NDArray[Any]) -> None:
+    def values(self, path: str, time: NDArray[np.float64], **values: Sequence[Any] | NDArray[Any] | Ragged) -> None:
         """Values that no view draws, of any type: one, or an array of them, of each name at each time."""
         columns = []
         for name, rows in values.items():
-            if isinstance(rows, np.ndarray):
+            if isinstance(rows, Ragged):
+                flat, offsets = rows.values, _offsets(rows.lengths)
+            elif isinstance(rows, np.ndarray):
                 flat, offsets = rows.ravel(), _even(len(rows), rows[0].size if len(rows) else 0)
             elif any(map(np.ndim, rows)):
                 flat, offsets = np.concatenate([np.ravel(row) for row in rows]), _offsets(list(map(np.size, rows)))

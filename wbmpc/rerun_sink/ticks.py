@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wbmpc.recorder import Recorder
 from wbmpc.rerun_sink.palette import AXES, FAULT, LEFT, LIMIT, MEASURED, PLANNED, RIGHT
-from wbmpc.rerun_sink.stream import Colour, Stream, worst_since_last
+from wbmpc.rerun_sink.stream import Colour, Ragged, Stream, worst_since_last
 from wbmpc.signals import SIDES, HandMode, SolveStatus
 
 FELL_BACK = ", fallback"
@@ -116,8 +116,7 @@ def _write_hands_and_feet(
 def _write_contacts(stream: Stream, recorder: Recorder, rows: NDArray[np.int64], time: NDArray[np.float64]) -> None:
     contacts, counts = recorder.contacts_of(rows), recorder.contact_count[rows]
     stream.force_arrows("/world/contacts", time, contacts.position, contacts.force, counts)
-    pairs = np.split(contacts.geoms.ravel(), 2 * np.cumsum(counts)[:-1])
-    stream.values(CONTACT_GEOMS, time, geoms=pairs)
+    stream.values(CONTACT_GEOMS, time, geoms=Ragged(contacts.geoms.ravel(), 2 * counts))
     deepest = np.zeros(len(rows))
     np.maximum.at(deepest, np.repeat(np.arange(len(rows)), counts), -1e3 * contacts.distance)
     stream.scalars("/contacts/penetration", time, deepest)
