@@ -29,8 +29,9 @@ def random_signal(cls: type, rng: np.random.Generator, **given_fields: object) -
     shapes = {
         Truth: dict(
             qpos=size.nq, qvel=size.nv, torque=size.nj, torque_limit=size.nj, com=3, com_velocity=3,
-            angular_momentum=3, palm_position=(2, 3), sole_position=(2, 3), external_force=3, zmp=2, contact_position=(MAX_CONTACTS, 3),
-            contact_force=(MAX_CONTACTS, 3), contact_distance=MAX_CONTACTS, time=None, torso_up=None,
+            angular_momentum=3, palm_position=(2, 3), sole_position=(2, 3), external_force=3, zmp=2,
+            contact_position=(MAX_CONTACTS, 3), contact_force=(MAX_CONTACTS, 3),
+            contact_distance=MAX_CONTACTS, time=None, torso_up=None,
         ),
         RobotState: dict(
             q=size.nq, v=size.nv, sole_wrench_in_world=(2, 6), palm_force_in_world=(2, 3), time=None, mass_scale=None
