@@ -245,6 +245,12 @@ def test_a_planner_that_dies_in_its_process_is_missed() -> None:
     assert not planner._worker.process.is_alive()
 
 
+def test_a_plan_that_is_in_work_at_the_end_is_given_up() -> None:
+    with PlannerProcess(STAND, Mailbox()) as planner:
+        planner.request(still(0.01))
+    planner.check()  # as the loop does, for an error of the last plan
+
+
 def test_what_a_planner_raises_in_its_process_says_on_which_snapshot() -> None:
     with PlannerProcess(STAND, Mailbox()) as planner:
         planner.request(replace(still(0.01), q=np.zeros(3)))

@@ -76,6 +76,7 @@ class PlannerProcess:
         return self
 
     def __exit__(self, *exception: object) -> None:
+        self._in_work = None  # nobody asks for it any more
         self._worker.end()
 
     def _send(self, request: Request) -> None:
