@@ -16,6 +16,7 @@ from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
+from wbmpc.rotations import length
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vector
 
@@ -236,7 +237,7 @@ class Candidates:
         for candidate in self.all:
             key, reach = id(candidate), reaches[id(candidate)]
             goal = candidate.goal(self._robot.palm_radius).position
-            distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
+            distances[key] = length(goal - palms[candidate.hand])
             takers = [option.hand for option in held if option.patch.name == candidate.patch.name]
             if candidate.hand in takers:
                 reasons[key] = "held already"

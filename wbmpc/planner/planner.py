@@ -214,7 +214,7 @@ class Planner:
         if self._last is not None:
             self._elapsed = state.time - self._time
             planned = self._last.com_state(state.time)
-            height = float(planned[2, 0] - self._gait.feet.positions[:, 2].mean())
+            height = float(planned[2, 0]) - self._gait.feet.height
             self._com.update(planned, measured=self._measured.com, height=height)
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
@@ -224,7 +224,7 @@ class Planner:
         contacts, dt = self._contacts, self._elapsed
         gate_open = contacts.gate_open
         go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
-        self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
+        self._gate = min(max(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0), 1.0)
         self._gait.aim(self._footstep_shift[0], dt)
         self._gait.advance(
             state.time,
@@ -265,7 +265,7 @@ class Planner:
     def _improve_postures(self, *, iterations: int, everyone: bool = False) -> None:
         """Iterate the tasks' postures and the next candidate's (or everyone's)."""
         feet, stride = self._gait.feet, self._gait.stride
-        centre = feet.positions[:, :2].mean(axis=0) if stride is None else stride.stance_centre
+        centre = feet.centre if stride is None else stride.stance_centre
         if stride is not None or self._gait.phase == SupportPhase.STAND:  # walking keeps the standing posture
             self._references.update_postures(
                 self._contacts, feet=feet, stride=stride, centre=centre, iterations=iterations
