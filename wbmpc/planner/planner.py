@@ -163,19 +163,24 @@ class Planner:
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
 
-        failed = np.full((preview.steps, 3), np.nan)
+        course = com_course(self._com.value, motion, height)
+        if motion is not None:  # copies: a report outlives its motion
+            com, acceleration, zmp = course[0][1:, :, 0].copy(), course[0][1:, :, 2].copy(), motion.zmp.copy()
+        else:
+            com = acceleration = np.full((preview.steps, 3), np.nan)
+            zmp = com[:, :2]
         report = PlanReport(
             time=state.time,
             mass=mass,
-            com=np.column_stack([motion.com, height.height]) if motion else failed,
-            com_acceleration=np.column_stack([motion.acceleration, height.acceleration]) if motion else failed,
+            com=com,
+            com_acceleration=acceleration,
             com_height_band=band,
-            zmp=motion.zmp.copy() if motion else failed[:, :2],  # a report outlives its motion
+            zmp=zmp,
             support_polygon=gated_support.polygons[0].vertices,
             delta_z=judgement.delta_z,
             hand_reference=gated,
             contact_force=forces,
-            contact_phase=np.array([c.phase for c in contacts.hands]),
+            contact_phase=np.array([int(c.phase) for c in contacts.hands]),
             contact_patch=(contacts.name(0), contacts.name(1)),
             progress=self._tasks.rate,
             stage1=stage1,
@@ -193,7 +198,7 @@ class Planner:
             report,
             step=preview.step,
             period=self._period,
-            course=com_course(self._com.value, motion, height),
+            course=course,
             velocity=motion.joint_velocity if motion is not None else np.zeros(self._robot.nv),
             joints=self._joints,
             stance=self._gait.stance,
