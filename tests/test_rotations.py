@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose
 
-from wbmpc.rotations import contact_frame, level_frame, rotation_error
+from wbmpc.rotations import contact_frame, length, level_frame, rotation_error
 from wbmpc.signals import Vector
 
 NEARLY_HALF_TURN = np.pi - 1e-3  # [rad]; at a half turn the axis has two signs
@@ -53,3 +53,8 @@ def test_contact_frame_is_a_rotation_whose_third_axis_is_the_normal(normal: Vect
 @given(yaw=st.floats(-10, 10))
 def test_level_frame_turns_about_the_vertical(yaw: float) -> None:
     assert_allclose(level_frame(yaw), pin.exp3(np.array([0.0, 0.0, yaw])), atol=1e-12)
+
+
+@given(vector=vectors)
+def test_length_is_the_norm(vector: Vector) -> None:
+    assert length(vector) == np.linalg.norm(vector)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from wbmpc.signals import Vector
@@ -15,6 +17,11 @@ def cross(a: Vector, b: Vector) -> Vector:
     a0, a1, a2 = a.tolist()
     b0, b1, b2 = b.tolist()
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
+def length(vector: Vector) -> float:
+    """|vector| of a vector (n,), without the detours of numpy's norm."""
+    return sqrt(vector @ vector)
 
 
 def rotation_error(*, desired: Vector, measured: Vector) -> Vector:

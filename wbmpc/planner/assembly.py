@@ -12,7 +12,10 @@ from wbmpc.planner.joint_reference import JointReference
 from wbmpc.planner.lift import Lift
 from wbmpc.planner.plan import Plan
 from wbmpc.qp import QpSolution
+from wbmpc.rotations import UP
 from wbmpc.signals import SIDES, HandMode, PlanReport, StageReport, Vector
+
+FRICTION = 0.5  # of a hand without a patch: nobody asks
 
 
 def assemble(
@@ -42,19 +45,20 @@ def assemble(
         arm_keep_out: (2, 3, 5) half-spaces of the arms' points; a braced or hurried arm has none.
     """
     palm_position, palm_velocity = joints.palms(velocity)
-    palm_acceleration, palm_jerk = np.zeros((len(SIDES), 3)), np.array([contact.jerk for contact in contacts])
-    for contact in contacts:
-        if contact.hurried:  # straight from its path: stage 2's joint reference would come too late
-            side = contact.side
-            palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
-    caps = np.array([c.caps(np.array([0.0, period])) for c in contacts])  # now and one plan later
+    palm_acceleration, palm_jerk = np.zeros((len(SIDES), 3)), np.zeros((len(SIDES), 3))
+    urgency, friction, normal = np.zeros(len(SIDES)), np.full(len(SIDES), FRICTION), np.array([UP] * len(SIDES))
+    caps, top, ends = np.zeros((len(SIDES), 2)), np.zeros(len(SIDES)), np.array([0.0, period])
     for side, contact in enumerate(contacts):
-        if contact.hurried and contact.patch is not None:  # it may meet its surface before the next plan
-            caps[side] = contact.patch.force_cap
-    for side, mode in enumerate(modes):  # a palm on its surface holds the arm, a hurried one has its way planned
-        if mode == HandMode.CONTACT or contacts[side].hurried:
+        patch, hurried = contact.patch, contact.hurried
+        if patch is not None:
+            friction[side], normal[side], top[side] = patch.friction, patch.normal, patch.force_cap
+            # a hurried palm may meet its surface before the next plan
+            caps[side] = top[side] if hurried else contact.caps(ends)
+        if hurried:  # straight from its path: stage 2's joint reference would come too late
+            palm_position[side], palm_velocity[side], palm_acceleration[side] = contact.reference()
+            urgency[side], palm_jerk[side] = 1.0, contact.jerk
+        if hurried or modes[side] == HandMode.CONTACT:  # its way is planned, or the palm on its surface holds the arm
             arm_keep_out[side, :, 3] = -np.inf
-    urgency = np.array([float(c.hurried) for c in contacts])
     if lift is not None:
         lift.guard(arm_keep_out)
         urgency[:] = lift.urgency
@@ -82,9 +86,9 @@ def assemble(
         hand_force=report.contact_force[:, 0],
         hand_force_cap=caps[:, 0],
         hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / period,
-        hand_force_cap_top=np.array([c.patch.force_cap if c.patch else 0.0 for c in contacts]),
-        hand_normal=np.array([c.patch.normal if c.patch else [0.0, 0.0, 1.0] for c in contacts]),
-        hand_friction=np.array([c.patch.friction if c.patch else 0.5 for c in contacts]),
+        hand_force_cap_top=top,
+        hand_normal=normal,
+        hand_friction=friction,
         arm_keep_out=arm_keep_out,
         report=report,
     )

@@ -16,6 +16,7 @@ from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
+from wbmpc.rotations import length
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vector
 
@@ -33,6 +34,7 @@ class Candidate:
     patch: PatchPose
     hand: int
     posture: Posture
+    target: PalmTarget  # of the palm that rests on the patch
     excluded: str = ""  # why it is not to be chosen, "" when it may be
     tries: int = 0  # how often the palm did not get there
     current: bool = False  # its posture has been iterated for the feet as they stand
@@ -50,10 +52,6 @@ class Candidate:
         self.tries += 1
         if outcome == "missing" or self.tries >= MOST_TRIES:
             self.excluded = "tried before, in vain"
-
-    def goal(self, palm_radius: float) -> PalmTarget:
-        """The palm when it rests on the patch."""
-        return PalmTarget(self.patch.position + palm_radius * self.patch.normal, self.patch.normal)
 
 
 class Candidates:
@@ -74,9 +72,10 @@ class Candidates:
         backend: str,
     ) -> None:
         self._robot, self._settings, self._keep_out = robot, settings, keep_out
+        targets = [PalmTarget(p.position + robot.palm_radius * p.normal, p.normal) for p in patches]
         self.all = [
-            Candidate(patch, hand, Posture(robot, nominal=nominal, com_cost=COM_COST))
-            for patch in patches
+            Candidate(patch, hand, Posture(robot, nominal=nominal, com_cost=COM_COST), target)
+            for patch, target in zip(patches, targets, strict=True)
             for hand in range(len(SIDES))
         ]
         self._places = {(c.patch.name, c.hand): c for c in self.all}
@@ -105,12 +104,14 @@ class Candidates:
             self._stand = stand
             for candidate in self.all:
                 candidate.current = False
-        turn = self.all if everyone else [*used, *(c for c in [self._following()] if c not in used)]
-        heading = float(np.mean(yaws))
-        self._left = np.array([-np.sin(heading), np.cos(heading)])
+            heading = float(np.mean(yaws))
+            self._left = np.array([-np.sin(heading), np.cos(heading)])
+        turn = self.all if everyone else used
+        if not everyone and (following := self._following()) not in used:
+            turn = [*used, following]
         for candidate in turn:
             palms: list[PalmTarget | None] = [None, None]
-            palms[candidate.hand] = candidate.goal(self._robot.palm_radius)
+            palms[candidate.hand] = candidate.target
             count = iterations if candidate.settled else max(iterations, SEARCH_ITERATIONS)
             candidate.posture.iterate(count, soles=soles, yaws=yaws, palms=palms, centre=centre)
             candidate.current = True
@@ -205,7 +206,7 @@ class Candidates:
                     force_cost=seen.parts.force,
                     shift_cost=seen.parts.shift,
                     beside=tuple(option.patch.name for option in seen.beside),
-                    palm=candidate.goal(self._robot.palm_radius).position,
+                    palm=candidate.target.position,
                     reach_slack=reaches[key].slack,
                     reach_limit=reaches[key].limit,
                     friction_margin=friction_margin(patch, seen.forces) if np.isfinite(seen.cost) else float("nan"),
@@ -235,8 +236,7 @@ class Candidates:
         reasons: dict[int, str] = {}
         for candidate in self.all:
             key, reach = id(candidate), reaches[id(candidate)]
-            goal = candidate.goal(self._robot.palm_radius).position
-            distances[key] = float(np.linalg.norm(goal - palms[candidate.hand]))
+            distances[key] = length(candidate.target.position - palms[candidate.hand])
             takers = [option.hand for option in held if option.patch.name == candidate.patch.name]
             if candidate.hand in takers:
                 reasons[key] = "held already"

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from math import isfinite, sqrt
+
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.signals import GRAVITY, Vector
 
@@ -49,24 +52,66 @@ class ComState:
 
     def filter(self, velocity: Vector) -> None:
         """Take in a measured CoM velocity (3,) [m/s]."""
-        if np.isfinite(velocity).all():  # one broken measurement must not stay in the filter
-            self._velocity += VELOCITY_SHARE * (velocity - self._velocity)
+        _filter(velocity, self._velocity)
 
     def update(self, planned: Vector, *, measured: Vector, height: float) -> None:
         """Continue from the last plan's state (3, 3), given the measured CoM (3,) and its height over the feet [m]."""
-        settings = self._settings
+        settings, period = self._settings, self._period
         self.value = planned
-        if not np.isfinite(measured).all():
-            return
-        felt = (self._velocity[:2] - self._before) / self._period - planned[:2, 2]
-        self._push += PUSH_SHARE * (felt - self._push)
-        self._before = self._velocity[:2].copy()
-        position_error = measured[:2] - planned[:2, 0]
-        velocity_error = self._velocity[:2] - planned[:2, 1]
-        omega = np.sqrt(GRAVITY / max(height, 0.05))
-        capture_error = float(np.linalg.norm(position_error + velocity_error / omega))
-        alarm = min(max(capture_error / settings.feedback_knee - 1.0, 0.0), 1.0)
-        self.alarm = max(alarm, self.alarm - self._period / ALARM_TIME)
-        share = settings.feedback + alarm * (settings.feedback_large - settings.feedback)
-        self.value[:2, 0] += share * position_error
-        self.value[:2, 1] += share * velocity_error
+        alarm = _draw(
+            *(planned, measured, self._velocity, self._before, self._push),
+            *(period, sqrt(GRAVITY / max(height, 0.05))),
+            *(settings.feedback, settings.feedback_large, settings.feedback_knee),
+        )
+        if alarm >= 0.0:
+            self.alarm = max(alarm, self.alarm - period / ALARM_TIME)
+
+
+@kernel
+def _filter(velocity: Vector, filtered: Vector) -> None:
+    """Move `filtered` (3,) by its share to `velocity` (3,) [m/s]."""
+    if isfinite(velocity[0]) and isfinite(velocity[1]) and isfinite(velocity[2]):
+        for i in range(3):  # one broken measurement must not stay in the filter
+            filtered[i] += VELOCITY_SHARE * (velocity[i] - filtered[i])
+
+
+@kernel
+def _draw(
+    state: Vector,
+    measured: Vector,
+    velocity: Vector,
+    before: Vector,
+    push: Vector,
+    period: float,
+    omega: float,
+    least: float,
+    largest: float,
+    knee: float,
+) -> float:
+    """Draw `state` (3, 3) to the measured CoM (3,) and its velocity (3,), and take in what push (2,) they show.
+
+    Args:
+        before: (2,) [m/s] the velocity at the last plan; becomes that at this one.
+        omega: [1/s] of the capture point.
+        least, largest, knee: shares of the error, and the capture-point error [m] between them.
+
+    Returns:
+        The alarm 0 … 1 of this error alone; negative when nothing can be said.
+    """
+    if not (isfinite(measured[0]) and isfinite(measured[1]) and isfinite(measured[2])):
+        return -1.0
+    position_error, velocity_error, capture_error = np.empty(2), np.empty(2), np.empty(2)
+    for i in range(2):
+        felt = (velocity[i] - before[i]) / period - state[i, 2]
+        push[i] += PUSH_SHARE * (felt - push[i])
+        before[i] = velocity[i]
+        position_error[i] = measured[i] - state[i, 0]
+        velocity_error[i] = velocity[i] - state[i, 1]
+        capture_error[i] = position_error[i] + velocity_error[i] / omega
+    size = sqrt(np.dot(capture_error, capture_error))
+    alarm = min(max(size / knee - 1.0, 0.0), 1.0)
+    share = least + alarm * (largest - least)
+    for i in range(2):
+        state[i, 0] += share * position_error[i]
+        state[i, 1] += share * velocity_error[i]
+    return alarm

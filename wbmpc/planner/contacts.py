@@ -98,10 +98,10 @@ class Contacts:
     @property
     def posture(self) -> Posture | None:
         """The posture that has every hand with a contact on its patch and the CoM over the feet; None without one."""
-        used = self._used
-        if len(used) == 1:
-            return used[0].posture
-        return self._together if used else None
+        goals = [c for c in self.hands if c.has_goal]
+        if len(goals) > 1:
+            return self._together
+        return self.candidates.of(goals[0].patch, goals[0].side).posture if goals else None
 
     @property
     def _used(self) -> list[Candidate]:
@@ -122,8 +122,8 @@ class Contacts:
         self.candidates.refresh(
             soles=soles, yaws=yaws, centre=centre, iterations=iterations, used=self._used, everyone=everyone
         )
-        palms = [c.target for c in self.hands]
-        if all(palm is not None for palm in palms):
+        if all(c.has_goal for c in self.hands):
+            palms = [c.target for c in self.hands]
             self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
     def advance(
@@ -281,7 +281,10 @@ class Contacts:
 
     def _plan_forces(self, need: Need) -> StageReport:
         """Forces at every knot for the contacts that touch; a failed solve keeps the last ones."""
-        caps = np.array([c.caps(self._times) for c in self.hands])
+        caps = np.zeros(self.forces.shape[:2])
+        for contact in self.hands:
+            if contact.touching:
+                caps[contact.side] = contact.caps(self._times)
         if not caps.any():
             self.forces = np.zeros_like(self.forces)
             return NOT_RUN

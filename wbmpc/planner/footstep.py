@@ -56,7 +56,18 @@ class Feet:
     @property
     def heading(self) -> float:
         """[rad] the robot's, between the two."""
-        return float(self.yaws.mean())
+        left, right = self.yaws.tolist()
+        return 0.5 * (left + right)
+
+    @property
+    def centre(self) -> Vector:
+        """(2,) [m] between the two."""
+        return 0.5 * (self.positions[0, :2] + self.positions[1, :2])
+
+    @property
+    def height(self) -> float:
+        """[m] of the ground under the robot: the mean of both soles'."""
+        return 0.5 * float(self.positions[0, 2] + self.positions[1, 2])
 
     @property
     def aligned(self) -> bool:

@@ -11,6 +11,7 @@ from wbmpc.planner.pace import Pace
 from wbmpc.planner.posture import PalmTarget
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.urgent_approach import UrgentApproach
+from wbmpc.rotations import length
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import ContactPhase, HandMode, Vector
 
@@ -138,8 +139,8 @@ class HandContact:
         if self._urgent is not None and self.hurried:
             return self._urgent.preview(times)
         if self.touching or self._path is None or self._descent >= 0.0:
-            return np.tile(self.reference()[0], (len(times), 1))
-        return self._path.positions(np.clip(self._sigma + self._rate * times, 0.0, 1.0))
+            return np.full((len(times), 3), self.reference()[0])
+        return self._path.positions(np.minimum(np.maximum(self._sigma + self._rate * times, 0.0), 1.0))
 
     def caps(self, times: Vector) -> Vector:
         """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
@@ -147,7 +148,7 @@ class HandContact:
             return np.zeros(len(times))
         unloading = self.phase == ContactPhase.UNLOADED
         slope = -1.0 / self._settings.ramp_time if unloading else 1.0 / self._pace.ramp_time
-        return self.patch.force_cap * np.clip(self._level + slope * times, 0.0, 1.0)
+        return self.patch.force_cap * np.minimum(np.maximum(self._level + slope * times, 0.0), 1.0)
 
     # ------------------------------------------------------------------ the life
 
@@ -157,7 +158,7 @@ class HandContact:
         pace = self._pace = Pace.of(self._settings, self._urgency)
         clearance = patch.position + (self._radius + pace.clearance) * patch.normal
         self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)
-        self._duration = max(SHORTEST, float(np.linalg.norm(clearance - palm)) / self._settings.approach_speed)
+        self._duration = max(SHORTEST, length(clearance - palm) / self._settings.approach_speed)
         self._sigma, self._rate, self._descent = 0.0, 1.0 / self._duration, -1.0
         self._enter(ContactPhase.CHOSEN)
         self._urgent = None
@@ -169,7 +170,7 @@ class HandContact:
         """Leave the surface (or give the approach up): lift along the normal and return to `home` (3,)."""
         assert self.patch is not None
         self._path = HandPath(start=home.copy(), end=palm + 0.02 * self.patch.normal, away=self.patch.normal)
-        self._duration = max(0.6, float(np.linalg.norm(palm - home)) / self._settings.approach_speed)
+        self._duration = max(0.6, length(palm - home) / self._settings.approach_speed)
         self._sigma, self._rate, self._descent = 1.0, -1.0 / self._duration, -1.0
         self._enter(ContactPhase.RELEASED)
 
@@ -271,7 +272,7 @@ class HandContact:
         if self._descent < 0.0:
             self._sigma = min(1.0, self._sigma + self._rate * dt)
             if self._sigma >= 1.0:
-                if np.linalg.norm(palm - self._path.end) < self._pace.arrived:
+                if length(palm - self._path.end) < self._pace.arrived:
                     self._descent = 0.0
                 elif self._clock > self._duration + PATIENCE:
                     return "unreached"

@@ -41,8 +41,8 @@ class JointReference:
 
     @property
     def torso_rotation(self) -> Vector:
-        """(3, 3) torso to world at the reference."""
-        return self._kinematics.rotation(self._robot.torso_frame)
+        """(3, 3) torso to world, where `tasks` looked last."""
+        return np.array(self._views[4][2], order="C")
 
     def torso_velocity(self, velocity: Vector) -> Vector:
         """Angular velocity (3,) of the torso in world for joint velocities (nv,) [rad/s], where `tasks` looked last."""
@@ -59,7 +59,9 @@ class JointReference:
     def advance(self, velocity: Vector, dt: float) -> None:
         """Integrate q̇ (nv,) over dt [s]."""
         self.q = self._robot.integrate(self.q, dt * velocity)
-        np.clip(self.q[7:], self._robot.joint_lower, self._robot.joint_upper, out=self.q[7:])
+        joints = self.q[7:]
+        np.maximum(joints, self._robot.joint_lower, out=joints)
+        np.minimum(joints, self._robot.joint_upper, out=joints)
 
     def tasks(
         self,

@@ -55,7 +55,7 @@ class Journey:
 
     def arrived(self, feet: Feet) -> bool:
         """Whether the feet stand at the place, side by side."""
-        rest = plane_rotation(feet.heading).T @ (np.array(self.task.target) - feet.positions[:, :2].mean(axis=0))
+        rest = plane_rotation(feet.heading).T @ (np.array(self.task.target) - feet.centre)
         return float(np.abs(rest).max()) < ALIGNED and feet.aligned
 
     def _look(self, feet: Feet) -> Footstep | None:
@@ -69,7 +69,7 @@ class Journey:
             return None
         task, settings = self.task, self._settings
         turn = plane_rotation(feet.heading)
-        rest = turn.T @ (np.array(task.target) - feet.positions[:, :2].mean(axis=0))
+        rest = turn.T @ (np.array(task.target) - feet.centre)
         side = (0 if rest[1] >= 0.0 else 1) if feet.last < 0 else 1 - feet.last
         across = SIDE_SIGN[side] * settings.step_width
         goal = turn.T @ (np.array(task.target) - feet.positions[1 - side][:2]) + [0.0, across / 2]

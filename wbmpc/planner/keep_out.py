@@ -67,7 +67,8 @@ def _of_arms(
     points = np.empty((n, 3))
     for side in range(2):
         for i in range(n):
-            points[i] = palms[side] + SHARES[i] * (elbows[side] - palms[side])
+            for j in range(3):
+                points[i, j] = palms[side, j] + SHARES[i] * (elbows[side, j] - palms[side, j])
         rows, distances = _half_spaces(points, centres, halves, to_world)
         away, clearances = _from_axes(points, leg_links)
         for i in range(n):
@@ -75,11 +76,15 @@ def _of_arms(
                 rows[i, 3], distances[i] = -np.inf, np.inf
             clearance = clearances[i] - leg_radius
             if clearance < min(distances[i], NEAR):
-                rows[i, :3] = away[i]
-                rows[i, 3] = np.sum(away[i] * points[i]) - clearance + DISTANCE
+                level = 0.0
+                for j in range(3):
+                    rows[i, j] = away[i, j]
+                    level += away[i, j] * points[i, j]
+                rows[i, 3] = level - clearance + DISTANCE
             distances[i] = min(distances[i], clearance)
-        chosen = np.array([0, 1 + np.argmin(distances[1:-1]), n - 1])
-        arms[side, :, :4], arms[side, :, 4] = rows[chosen], SHARES[chosen]
+        nearest = 1 + int(np.argmin(distances[1:-1]))
+        for row, i in enumerate((0, nearest, n - 1)):
+            arms[side, row, :4], arms[side, row, 4] = rows[i], SHARES[i]
     return arms
 
 
@@ -122,13 +127,21 @@ def _half_spaces(points: Vector, centres: Vector, halves: Vector, to_world: Vect
 def _from_axes(points: Vector, links: Vector) -> tuple[Vector, Vector]:
     """Unit directions (n, 3) away from the nearest of the links' axes (k, 2, 3), and distances (n,) [m] to it."""
     away, distances = np.zeros((len(points), 3)), np.full(len(points), np.inf)
+    along, offset = np.empty(3), np.empty(3)
     for n in range(len(points)):
         for k in range(len(links)):
-            along = links[k, 1] - links[k, 0]
-            offset = points[n] - links[k, 0]
-            offset -= min(max(np.sum(offset * along) / np.sum(along * along), 0.0), 1.0) * along
-            distance = np.sqrt(np.sum(offset * offset))
+            product = square = 0.0
+            for i in range(3):
+                along[i], offset[i] = links[k, 1, i] - links[k, 0, i], points[n, i] - links[k, 0, i]
+                product += offset[i] * along[i]
+                square += along[i] * along[i]
+            share, distance = min(max(product / square, 0.0), 1.0), 0.0
+            for i in range(3):
+                offset[i] -= share * along[i]
+                distance += offset[i] * offset[i]
+            distance = np.sqrt(distance)
             if distance < distances[n]:
                 distances[n] = distance
-                away[n] = offset / max(distance, 1e-9)
+                for i in range(3):
+                    away[n, i] = offset[i] / max(distance, 1e-9)
     return away, distances

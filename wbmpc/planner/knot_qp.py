@@ -65,14 +65,11 @@ def pack_need(need: Need, packed: Vector) -> None:
     packed[:, 5:7] = need.phantom
     before = None
     for k, polygon in enumerate(need.polygons):
-        row = packed[k]
-        if polygon is before:  # standing feet have the same polygon at many knots
-            row[7:] = packed[k - 1, 7:]
-            continue
-        row[7] = polygon.plane_height
-        row[8 : 8 + MAX_EDGES] = polygon.offsets
-        row[8 + MAX_EDGES :] = polygon.normals.ravel()
-        before = polygon
+        if polygon is not before:  # standing feet have the same one at many knots: it is written to the end
+            packed[k:, 7] = polygon.plane_height
+            packed[k:, 8 : 8 + MAX_EDGES] = polygon.offsets
+            packed[k:, 8 + MAX_EDGES :] = polygon.normals.ravel()
+            before = polygon
 
 
 def pack_patch(patch: PatchPose, packed: Vector) -> None:

@@ -113,11 +113,11 @@ def com_course(now: Vector, motion: Motion | None, height: HeightPlan) -> tuple[
     """
     n = len(height.jerk)
     states, jerk = np.empty((n + 1, 3, 3)), np.zeros((n, 3))
-    states[0] = now
-    jerk[:, 2] = height.jerk
-    states[1:, 2] = np.column_stack([height.height, height.velocity, height.acceleration])
-    states[1:, :2] = now[:2]
-    if motion is not None:
-        jerk[:, :2] = motion.jerk
-        states[1:, :2] = np.stack([motion.com, motion.velocity, motion.acceleration], axis=2)
+    c, v, a = states[1:, :, 0], states[1:, :, 1], states[1:, :, 2]
+    states[0], jerk[:, 2] = now, height.jerk
+    c[:, 2], v[:, 2], a[:, 2] = height.height, height.velocity, height.acceleration
+    if motion is None:
+        states[1:, :2] = now[:2]
+    else:
+        jerk[:, :2], c[:, :2], v[:, :2], a[:, :2] = motion.jerk, motion.com, motion.velocity, motion.acceleration
     return states, jerk

@@ -163,19 +163,24 @@ class Planner:
         if motion is not None:
             self._footstep_shift = motion.footstep_shift
 
-        failed = np.full((preview.steps, 3), np.nan)
+        course = com_course(self._com.value, motion, height)
+        if motion is not None:  # copies: a report outlives its motion
+            com, acceleration, zmp = course[0][1:, :, 0].copy(), course[0][1:, :, 2].copy(), motion.zmp.copy()
+        else:
+            com = acceleration = np.full((preview.steps, 3), np.nan)
+            zmp = com[:, :2]
         report = PlanReport(
             time=state.time,
             mass=mass,
-            com=np.column_stack([motion.com, height.height]) if motion else failed,
-            com_acceleration=np.column_stack([motion.acceleration, height.acceleration]) if motion else failed,
+            com=com,
+            com_acceleration=acceleration,
             com_height_band=band,
-            zmp=motion.zmp.copy() if motion else failed[:, :2],  # a report outlives its motion
+            zmp=zmp,
             support_polygon=gated_support.polygons[0].vertices,
             delta_z=judgement.delta_z,
             hand_reference=gated,
             contact_force=forces,
-            contact_phase=np.array([c.phase for c in contacts.hands]),
+            contact_phase=np.array([int(c.phase) for c in contacts.hands]),
             contact_patch=(contacts.name(0), contacts.name(1)),
             progress=self._tasks.rate,
             stage1=stage1,
@@ -193,7 +198,7 @@ class Planner:
             report,
             step=preview.step,
             period=self._period,
-            course=com_course(self._com.value, motion, height),
+            course=course,
             velocity=motion.joint_velocity if motion is not None else np.zeros(self._robot.nv),
             joints=self._joints,
             stance=self._gait.stance,
@@ -214,7 +219,7 @@ class Planner:
         if self._last is not None:
             self._elapsed = state.time - self._time
             planned = self._last.com_state(state.time)
-            height = float(planned[2, 0] - self._gait.feet.positions[:, 2].mean())
+            height = float(planned[2, 0]) - self._gait.feet.height
             self._com.update(planned, measured=self._measured.com, height=height)
             self._joints.advance(self._last.velocity, self._elapsed)
         self._time = state.time
@@ -224,7 +229,7 @@ class Planner:
         contacts, dt = self._contacts, self._elapsed
         gate_open = contacts.gate_open
         go_on = gate_open and not (self._gait.phase == SupportPhase.DOUBLE and contacts.leaving)
-        self._gate = float(np.clip(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0, 1.0))
+        self._gate = min(max(self._gate + (dt if go_on else -dt) / GATE_TIME, 0.0), 1.0)
         self._gait.aim(self._footstep_shift[0], dt)
         self._gait.advance(
             state.time,
@@ -265,7 +270,7 @@ class Planner:
     def _improve_postures(self, *, iterations: int, everyone: bool = False) -> None:
         """Iterate the tasks' postures and the next candidate's (or everyone's)."""
         feet, stride = self._gait.feet, self._gait.stride
-        centre = feet.positions[:, :2].mean(axis=0) if stride is None else stride.stance_centre
+        centre = feet.centre if stride is None else stride.stance_centre
         if stride is not None or self._gait.phase == SupportPhase.STAND:  # walking keeps the standing posture
             self._references.update_postures(
                 self._contacts, feet=feet, stride=stride, centre=centre, iterations=iterations

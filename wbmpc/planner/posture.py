@@ -130,7 +130,9 @@ class Posture:
                 *(self.q, self._nominal, self._lower, self._upper, self._delta, self._found),
             )
             self.q = robot.integrate(self.q, self._delta)
-            np.clip(self.q[7:], self._lower, self._upper, out=self.q[7:])
+            joints = self.q[7:]
+            np.maximum(joints, self._lower, out=joints)
+            np.minimum(joints, self._upper, out=joints)
             self._step = self._found[4]
         self.com = self._kinematics.com
         self.palm_errors = self._found[:2].copy()

@@ -53,7 +53,7 @@ class Progress:
         """One plan later; the gate is closed while an expected contact is missing; `met`: the target is met now."""
         task, before = self._task, self.rate
         lowest = min(self.rate, 0.0)  # below 0 only on a way back that was called off
-        self.rate = float(np.clip(self.rate + (dt if gate_open or lowest else -dt) / GATE_TIME, lowest, 1.0))
+        self.rate = min(max(self.rate + (dt if gate_open or lowest else -dt) / GATE_TIME, lowest), 1.0)
         if self.phase == TaskPhase.WAIT and time >= task.start - 1e-9:
             self.phase = TaskPhase.GO
         if self.phase == TaskPhase.GO:
@@ -88,5 +88,5 @@ class Progress:
         return np.clip(self.sigma + max(rate, 0.0) * moving / self._go_time, 0.0, 1.0)
 
     def _move(self, rate: float, acceleration: float, dt: float) -> None:
-        self.sigma = float(np.clip(self.sigma + rate * dt, 0.0, 1.0))
+        self.sigma = min(max(self.sigma + rate * dt, 0.0), 1.0)
         self.sigma_rate, self.sigma_acceleration = rate, acceleration

@@ -9,6 +9,7 @@ import numpy as np
 from wbmpc.planner.hand_path import HandPath
 from wbmpc.planner.moving_target import MovingTarget
 from wbmpc.planner.progress import Progress, TaskPhase
+from wbmpc.rotations import length
 from wbmpc.scenario import ReachTask
 from wbmpc.signals import Vector
 
@@ -45,7 +46,7 @@ class Reach:
 
     def advance(self, time: float, dt: float, *, gate_open: bool, palm: Vector) -> None:
         """One plan later: `palm` (3,) is measured [m]; the gate is closed while an expected contact is missing."""
-        met = float(np.linalg.norm(palm - self._place.goal)) < self.task.tolerance
+        met = length(palm - self._place.goal) < self.task.tolerance
         self.progress.advance(time, dt, gate_open=gate_open, met=met)
         if self._place.moving:
             self._place.advance(dt * max(self.progress.rate, 0.0))

@@ -46,6 +46,8 @@ class Stepping:
 
     def command(self, time: float) -> Vector | None:
         """Velocity command (forward, left, yaw rate) [m/s, rad/s]; None before the first one."""
+        if not self.has_commands:
+            return None
         given = np.flatnonzero(self._command_times <= time + 1e-9)
         return self._commands[given[-1]] if given.size else None
 

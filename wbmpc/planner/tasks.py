@@ -10,6 +10,7 @@ from wbmpc.planner.lift import Lift
 from wbmpc.planner.progress import TaskPhase
 from wbmpc.planner.reach import Reach
 from wbmpc.robot import Robot
+from wbmpc.rotations import length
 from wbmpc.scenario import ComHeightTask, LeanTask, Load, ReachTask, Task
 from wbmpc.signals import SIDES, TargetMove, Vector
 
@@ -74,7 +75,7 @@ class Tasks:
                 name, palm = f"reach {SIDES[task.side]}", palms[task.side]
                 task.advance(time, dt, gate_open=gate_open, palm=palm)
                 if task.progress.phase == TaskPhase.HOLD:
-                    short = float(np.linalg.norm(palm - task.target)) - 0.5 * task.task.tolerance
+                    short = length(palm - task.target) - 0.5 * task.task.tolerance
                     self.shrink = min(max(self.shrink + SHRINK_RATE * dt * short, 0.0), SHRINK_LIMIT)
             else:
                 name = "lean"
