@@ -19,11 +19,21 @@ def height_band(settings: HeightSettings, references: Vector, distance: Vector, 
         distance: (ends,) d of each [m].
         plane: height of the feet [m].
     """
-    z = references[:, :, 2]
-    low = np.fmax.reduce(z - distance[:, None], axis=0)
-    high = np.fmin.reduce(z + distance[:, None], axis=0)
-    low, high = np.fmax(low, plane + settings.lowest), np.fmin(high, plane + settings.highest)
-    return np.column_stack([low, high])
+    return _between(references, distance, plane + settings.lowest, plane + settings.highest)
+
+
+@kernel
+def _between(references: Vector, distance: Vector, lowest: float, highest: float) -> Vector:
+    ends, n = references.shape[0], references.shape[1]
+    band = np.empty((n, 2))
+    for k in range(n):
+        low, high = lowest, highest
+        for end in range(ends):
+            z = references[end, k, 2]
+            if not np.isnan(z):
+                low, high = max(low, z - distance[end]), min(high, z + distance[end])
+        band[k, 0], band[k, 1] = low, high
+    return band
 
 
 def horizontal_band(references: Vector, distance: Vector) -> Vector:
