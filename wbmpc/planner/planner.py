@@ -116,14 +116,15 @@ class Planner:
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
+        posture, torso_up, torso_heading = references.attitude(contacts, float(soles.yaws.mean()))
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
             hands=hands,
-            posture=references.posture(contacts),
-            torso_up=references.torso_up(contacts),
-            torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
+            posture=posture,
+            torso_up=torso_up,
+            torso_heading=torso_heading,
         )
 
         def stage_2(
