@@ -17,7 +17,7 @@ from wbmpc.signals import SolveStatus, Vector
 N, T = 16, 0.1
 PREVIEW = Preview(steps=N, step=T)
 SETTINGS = HeightSettings()
-LIMITS = np.tile([0.16, 0.275], (N, 1))
+LIMITS = (0.16, 0.275)
 OPEN = np.tile([-np.inf, np.inf], (N, 1))
 EYE = np.eye(N)
 
@@ -26,25 +26,27 @@ def stage(**changes: float) -> ComHeightStage:
     return ComHeightStage(PREVIEW, SETTINGS.model_copy(update=changes), backend="daqp")
 
 
-def solve(problem: ComHeightStage, state: Vector, wanted: Vector, limits: Vector, band: Vector) -> HeightPlan:
+def solve(
+    problem: ComHeightStage, state: Vector, wanted: Vector, limits: tuple[float, float], band: Vector
+) -> HeightPlan:
     plan, solution = problem.solve(state, wanted=wanted, limits=limits, band=band)
     assert plan is not None
     assert solution.status == SolveStatus.SOLVED
     return plan
 
 
-def cost(s: HeightSettings, plan: HeightPlan, wanted: Vector, limits: Vector, band: Vector) -> float:
+def cost(s: HeightSettings, plan: HeightPlan, wanted: Vector, limits: tuple[float, float], band: Vector) -> float:
     """½ Σ of the weighted squares that the docstring names."""
 
-    def outside(bounds: Vector) -> float:
-        return float(np.sum(np.maximum(0.0, np.maximum(bounds[:, 0] - plan.height, plan.height - bounds[:, 1])) ** 2))
+    def outside(low: Vector | float, high: Vector | float) -> float:
+        return float(np.sum(np.maximum(0.0, np.maximum(low - plan.height, plan.height - high)) ** 2))
 
     return 0.5 * (
         s.jerk_cost * float(plan.jerk @ plan.jerk)
         + s.velocity_cost * float(plan.velocity @ plan.velocity)
         + s.position_cost * float(np.sum((plan.height - wanted) ** 2))
-        + s.limit_slack_cost * outside(limits)
-        + s.band_slack_cost * outside(band)
+        + s.limit_slack_cost * outside(*limits)
+        + s.band_slack_cost * outside(*band.T)
     )
 
 
@@ -56,7 +58,7 @@ def test_no_plan_nearby_costs_less_when_the_middle_of_the_band_has_its_share(see
     state = np.array([rng.uniform(0.20, 0.24), 0.0, 0.0])
     wanted, middle = np.full(N, rng.uniform(0.2, 0.24)), np.full(N, rng.uniform(0.2, 0.24))
     band = np.column_stack([middle - 0.06, middle + 0.06])
-    plan = solve(stage(middle_share=share), state, wanted, OPEN, band)
+    plan = solve(stage(middle_share=share), state, wanted, (-np.inf, np.inf), band)
 
     def price(jerk: Vector) -> float:
         height, velocity = PREVIEW.P_ps @ state + PREVIEW.P_pu @ jerk, PREVIEW.P_vs @ state + PREVIEW.P_vu @ jerk
@@ -96,7 +98,7 @@ def test_optimum_is_another_solvers(seed: int) -> None:
     other.cost([(jerk, EYE)], np.zeros(N), SETTINGS.jerk_cost)
     other.cost([(dc, EYE)], np.zeros(N), SETTINGS.velocity_cost)
     other.cost([(c, EYE)], wanted, SETTINGS.position_cost)
-    other.soft_bound([(c, EYE)], LIMITS[:, 0], LIMITS[:, 1], SETTINGS.limit_slack_cost)
+    other.soft_bound([(c, EYE)], np.full(N, LIMITS[0]), np.full(N, LIMITS[1]), SETTINGS.limit_slack_cost)
     other.soft_bound([(c, EYE)], band[:, 0], band[:, 1], SETTINGS.band_slack_cost)
     x, optimum = other.solve()
     assert cost(SETTINGS, plan, wanted, LIMITS, band) == pytest.approx(optimum, rel=1e-6, abs=1e-12)
@@ -112,8 +114,8 @@ def test_limits_and_band_are_kept(height: float, velocity: float, wanted: float)
     assert plan.height.min() >= 0.18 - 1e-3
     assert plan.height.max() <= 0.25 + 1e-3
     free = solve(stage(), np.array([height, velocity, 0.0]), np.full(N, wanted), LIMITS, OPEN)
-    assert free.height.min() >= LIMITS[0, 0] - 1e-4
-    assert free.height.max() <= LIMITS[0, 1] + 1e-4
+    assert free.height.min() >= LIMITS[0] - 1e-4
+    assert free.height.max() <= LIMITS[1] + 1e-4
 
 
 def test_an_end_effector_on_the_ground_brings_the_com_down() -> None:
@@ -126,8 +128,8 @@ def test_an_end_effector_on_the_ground_brings_the_com_down() -> None:
 
 def test_a_start_outside_the_limits_still_has_a_plan() -> None:
     plan = solve(stage(), np.array([0.30, 0.0, 0.0]), np.full(N, 0.264), LIMITS, OPEN)
-    assert plan.height[0] > LIMITS[0, 1]
-    assert plan.height[-1] <= LIMITS[0, 1] + 1e-4
+    assert plan.height[0] > LIMITS[1]
+    assert plan.height[-1] <= LIMITS[1] + 1e-4
 
 
 def test_end_effectors_that_disagree_meet_in_the_middle() -> None:

@@ -9,6 +9,7 @@ from wbmpc.planner.settings import HeightSettings
 from wbmpc.signals import Vector
 
 UNBOUNDED = 0.3  # [m] d of a hand that does not bind the CoM
+NO_FOOT = np.empty((0, 0, 2))
 
 
 def height_band(settings: HeightSettings, references: Vector, distance: Vector, plane: float) -> Vector:
@@ -19,40 +20,47 @@ def height_band(settings: HeightSettings, references: Vector, distance: Vector, 
         distance: (ends,) d of each [m].
         plane: height of the feet [m].
     """
-    z = references[:, :, 2]
-    low = np.fmax.reduce(z - distance[:, None], axis=0)
-    high = np.fmin.reduce(z + distance[:, None], axis=0)
-    low, high = np.fmax(low, plane + settings.lowest), np.fmin(high, plane + settings.highest)
-    return np.column_stack([low, high])
-
-
-def horizontal_band(references: Vector, distance: Vector) -> Vector:
-    """Admissible band (2, N, 2) of the horizontal CoM: axis, knot, lowest and highest [m]; ±inf where nothing binds.
-
-    Args:
-        references: (ends, N, 3) or (ends, N, 2) positions of the end-effectors [m], nan rows for free ones.
-        distance: (ends, 2) or (ends, N, 2) d of each, per axis [m].
-
-    Where two end-effectors disagree the band is the point between their bounds.
-    """
-    places = np.ascontiguousarray(references[:, :, :2])  # one memory layout, one compilation
-    each = np.empty_like(places)
-    each[:] = distance if distance.ndim == 3 else distance[:, None]
-    return _meet(places, each)
+    return _between(references, distance, plane + settings.lowest, plane + settings.highest)
 
 
 @kernel
-def _meet(references: Vector, distance: Vector) -> Vector:
-    """The band of `references` (ends, N, 2) and distances (ends, N, 2), both C-contiguous."""
+def _between(references: Vector, distance: Vector, lowest: float, highest: float) -> Vector:
     ends, n = references.shape[0], references.shape[1]
+    band = np.empty((n, 2))
+    for k in range(n):
+        low, high = lowest, highest
+        for end in range(ends):
+            z = references[end, k, 2]
+            if not np.isnan(z):
+                low, high = max(low, z - distance[end]), min(high, z + distance[end])
+        band[k, 0], band[k, 1] = low, high
+    return band
+
+
+@kernel
+def horizontal_band(palms: Vector, distance: Vector, foot: Vector, foot_distance: Vector) -> Vector:
+    """Admissible band (2, N, 2) of the horizontal CoM: axis, knot, lowest and highest [m]; ±inf where nothing binds.
+
+    Args:
+        palms: (hands, N, 3) references in world [m], nan rows for free ones.
+        distance: (hands, 2) d of each, per axis [m].
+        foot: (feet, N, 2) places of a foot on its way [m]; `NO_FOOT` without one.
+        foot_distance: (feet, N, 2) its d [m].
+
+    Where two end-effectors disagree the band is the point between their bounds.
+    """
+    n = palms.shape[1]
     band = np.empty((2, n, 2))
     for axis in range(2):
         for k in range(n):
             low, high = -np.inf, np.inf
-            for end in range(ends):
-                place = references[end, k, axis]
+            for hand in range(len(palms)):
+                place, d = palms[hand, k, axis], distance[hand, axis]
                 if not np.isnan(place):
-                    low, high = max(low, place - distance[end, k, axis]), min(high, place + distance[end, k, axis])
+                    low, high = max(low, place - d), min(high, place + d)
+            for i in range(len(foot)):
+                place, d = foot[i, k, axis], foot_distance[i, k, axis]
+                low, high = max(low, place - d), min(high, place + d)
             if low > high:
                 low = high = 0.5 * (low + high)
             band[axis, k, 0], band[axis, k, 1] = low, high

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import HeightSettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
@@ -22,6 +24,17 @@ class HeightPlan:
     acceleration: Vector  # [m/s²]
 
 
+class Course(NamedTuple):
+    """Those matrices of `Preview` that are used here."""
+
+    P_ps: Vector
+    P_vs: Vector
+    P_as: Vector
+    P_pu: Vector
+    P_vu: Vector
+    P_au: Vector
+
+
 class ComHeightStage:
     """minimise  w_j |U|² + w_v |Ċ|² + w_p |C − C_wanted|²  over the vertical jerks U (N,)
 
@@ -36,7 +49,8 @@ class ComHeightStage:
 
     def __init__(self, preview: Preview, settings: HeightSettings, *, backend: str) -> None:
         n = preview.steps
-        self._preview = preview
+        self._steps = n
+        self._course = Course(preview.P_ps, preview.P_vs, preview.P_as, preview.P_pu, preview.P_vu, preview.P_au)
         self._settings = settings
         weights = np.concatenate([np.full(n, settings.limit_slack_cost), np.full(n, settings.band_slack_cost)])
         self.problem = QuadraticProgram(n, 2 * n, soft_weight=weights)
@@ -55,55 +69,78 @@ class ComHeightStage:
 
         `state` (3,) is brought to rest in that case.
         """
-        settings, steps = self._settings, self._preview.steps
-        limits = np.tile([plane + settings.lowest, plane + settings.highest], (steps, 1))
+        settings = self._settings
+        limits = (plane + settings.lowest, plane + settings.highest)
         plan, solution = self.solve(state, wanted=wanted, limits=limits, band=band)
         if plan is None or not settings.enabled:
             state[1:] = 0.0
-            zero = np.zeros(steps)
-            plan = HeightPlan(zero, np.full(steps, state[0]), zero, zero)
+            zero = np.zeros(self._steps)
+            plan = HeightPlan(zero, np.full(self._steps, state[0]), zero, zero)
         return plan, solution
 
     def solve(
-        self, state: Vector, *, wanted: Vector, limits: Vector, band: Vector
+        self, state: Vector, *, wanted: Vector, limits: tuple[float, float], band: Vector
     ) -> tuple[HeightPlan | None, QpSolution]:
         """Plan the height from `state` (3,) = (c_z, ċ_z, c̈_z).
 
         Args:
             state: [m, m/s, m/s²] in world.
             wanted: (N,) height to stay near [m].
-            limits: (N, 2) lowest and highest height the legs allow [m].
+            limits: lowest and highest height the legs allow [m].
             band: (N, 2) admissible band of the end-effectors, R ± d [m]; ±inf where nothing binds.
 
         Returns:
             The plan, or None when the solve failed (the solution carries the status).
         """
-        preview, settings, qp = self._preview, self._settings, self.problem
-        drift = preview.P_ps @ state
-        n = preview.steps
-        qp.lower[:n], qp.upper[:n] = limits[:, 0] - drift, limits[:, 1] - drift
-        low, high = band[:, 0], band[:, 1]
-        if settings.middle_share and np.isfinite(band).all():
-            wanted = wanted + settings.middle_share * (0.5 * (low + high) - wanted)
-        qp.gradient[:] = settings.velocity_cost * (preview.P_vu.T @ (preview.P_vs @ state)) + settings.position_cost * (
-            preview.P_pu.T @ (drift - wanted)
+        settings, qp, state = self._settings, self.problem, np.ascontiguousarray(state)
+        _write(
+            *(qp.gradient, qp.lower, qp.upper, self._course, state, wanted, *limits, band),
+            *(settings.velocity_cost, settings.position_cost, settings.middle_share),
         )
-        crossed = low > high
-        if crossed.any():  # two end-effectors disagree: the compromise between them
-            low, high = low.copy(), high.copy()
-            low[crossed] = high[crossed] = 0.5 * (low + high)[crossed]
-        qp.lower[n:], qp.upper[n:] = low - drift, high - drift
         solution = self._workspace.solve(matrices_changed=self._fresh)
         self._fresh = False
         if solution.status != SolveStatus.SOLVED:
             return None, solution
         jerk = solution.x.copy()
-        return (
-            HeightPlan(
-                jerk=jerk,
-                height=drift + preview.P_pu @ jerk,
-                velocity=preview.P_vs @ state + preview.P_vu @ jerk,
-                acceleration=preview.P_as @ state + preview.P_au @ jerk,
-            ),
-            solution,
-        )
+        return HeightPlan(jerk, *_read(self._course, state, jerk)), solution
+
+
+@kernel
+def _write(
+    gradient: Vector,
+    lower: Vector,
+    upper: Vector,
+    course: Course,
+    state: Vector,
+    wanted: Vector,
+    lowest: float,
+    highest: float,
+    band: Vector,
+    velocity_cost: float,
+    position_cost: float,
+    middle_share: float,
+) -> None:
+    """Gradient (N,) and bounds (2 N,) of the problem; where two end-effectors disagree, the compromise between them."""
+    n = len(gradient)
+    drift, error = course.P_ps @ state, np.empty(n)
+    share = middle_share if np.isfinite(band).all() else 0.0
+    for k in range(n):
+        low, high = band[k]
+        error[k] = drift[k] - (wanted[k] + share * (0.5 * (low + high) - wanted[k]) if share > 0.0 else wanted[k])
+        if low > high:
+            low = high = 0.5 * (low + high)
+        lower[k], upper[k] = lowest - drift[k], highest - drift[k]
+        lower[n + k], upper[n + k] = low - drift[k], high - drift[k]
+    slope, pull = course.P_vu.T @ (course.P_vs @ state), course.P_pu.T @ error
+    for k in range(n):
+        gradient[k] = velocity_cost * slope[k] + position_cost * pull[k]
+
+
+@kernel
+def _read(course: Course, state: Vector, jerk: Vector) -> tuple[Vector, Vector, Vector]:
+    """Height, velocity and acceleration (N,) under the jerks (N,)."""
+    return (
+        course.P_ps @ state + course.P_pu @ jerk,
+        course.P_vs @ state + course.P_vu @ jerk,
+        course.P_as @ state + course.P_au @ jerk,
+    )

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wbmpc.jit import kernel
+from wbmpc.jit import kernel, short_kernel
 from wbmpc.signals import Vector
 
 LEAD = (0.0, 0.6)  # part of σ in which the leading component moves
 LAG = (0.25, 1.0)  # and the following one
 
 
+@short_kernel
 def minimum_jerk(phase: float) -> tuple[float, float, float]:
     """Value, first and second derivative of the quintic from 0 to 1 that starts and ends at rest; clipped outside."""
     if phase <= 0.0:
@@ -41,17 +42,7 @@ class HandPath:
 
     def at(self, sigma: float) -> tuple[Vector, Vector, Vector]:
         """Position (3,) [m] and its first and second derivative with respect to σ."""
-        way = self.end - self.start
-        along = float(way @ self.away)
-        outward = along * self.away
-        first, second = (LEAD, LAG) if along >= 0.0 else (LAG, LEAD)
-        p, dp, ddp = self.start.copy(), np.zeros(3), np.zeros(3)
-        for part, (begin, finish) in ((outward, first), (way - outward, second)):
-            scale = 1.0 / (finish - begin)
-            s, ds, dds = minimum_jerk((sigma - begin) * scale)
-            p += s * part
-            dp += ds * scale * part
-            ddp += dds * scale**2 * part
+        p, dp, ddp = _at(self.start, self.end, self.away, sigma)
         return p, dp, ddp
 
     def shared(self, sigma: float, motion: Vector) -> tuple[Vector, Vector]:
@@ -69,6 +60,24 @@ class HandPath:
     def positions(self, sigmas: Vector) -> Vector:
         """Positions (n, 3) [m] at `sigmas` (n,)."""
         return _positions(self.start, self.end, self.away, sigmas)
+
+
+@kernel
+def _at(start: Vector, end: Vector, away: Vector, sigma: float) -> tuple[Vector, Vector, Vector]:
+    way = end - start
+    along = np.dot(way, away)
+    first, second = (LEAD, LAG) if along >= 0.0 else (LAG, LEAD)
+    outwards, across = 1.0 / (first[1] - first[0]), 1.0 / (second[1] - second[0])  # per σ
+    s, ds, dds = minimum_jerk((sigma - first[0]) * outwards)
+    t, dt, ddt = minimum_jerk((sigma - second[0]) * across)
+    p, dp, ddp = np.empty(3), np.empty(3), np.empty(3)
+    for i in range(3):
+        out = along * away[i]
+        rest = way[i] - out
+        p[i] = start[i] + s * out + t * rest
+        dp[i] = ds * outwards * out + dt * across * rest
+        ddp[i] = dds * outwards**2 * out + ddt * across**2 * rest
+    return p, dp, ddp
 
 
 @kernel

@@ -35,7 +35,7 @@ ROUNDS = 20  # of asking for further shifts; three are rare
 
 @dataclass(frozen=True, slots=True)
 class ZmpModel:
-    """Z = a c − b c̈ + j over the horizon (see `Preview.zmp_gains`), the same a, b for both axes."""
+    """Z = a c − b c̈ + j over the horizon (see zmp_model.py), the same a, b for both axes."""
 
     a: Vector  # (N,)
     b: Vector  # (N,)

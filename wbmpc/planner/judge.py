@@ -72,7 +72,7 @@ class Judge:
             return nothing
         need = need_of(
             *(wish, height, model),
-            carried=carried[:, :, 2].sum(axis=0),
+            carried=carried,
             polygons=support.polygons,
             mass=mass,
             exact=self._settings.formulation == "exact",

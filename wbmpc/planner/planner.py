@@ -30,7 +30,7 @@ from wbmpc.planner.stepping import Stepping
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.tasks import Tasks
 from wbmpc.planner.whole_body import HorizontalPlan, WholeBodyStage
-from wbmpc.planner.zmp_model import free_model, loaded_model
+from wbmpc.planner.zmp_model import free_model, held, loaded_model
 from wbmpc.qp import QpSolution
 from wbmpc.robot import Robot
 from wbmpc.scenario import Load, Obstacle, PatchPose, Task, Tread
@@ -116,14 +116,15 @@ class Planner:
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
+        posture, torso_up, torso_heading = references.attitude(contacts, float(soles.yaws.mean()))
         tasks = self._joints.tasks(
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
             hands=hands,
-            posture=references.posture(contacts),
-            torso_up=references.torso_up(contacts),
-            torso_heading=references.torso_heading(contacts, float(soles.yaws.mean())),
+            posture=posture,
+            torso_up=torso_up,
+            torso_heading=torso_heading,
         )
 
         def stage_2(
@@ -140,9 +141,9 @@ class Planner:
             )
 
         carried = references.carried(preview.times)
-        model = free_model(preview, height, plane=plane, mass=mass, exact=settings.formulation == "exact")
+        model = free_model(height, plane=plane, mass=mass, exact=settings.formulation == "exact")
         if carried.any():
-            model = loaded_model(preview, height, forces=carried, points=list(gated), plane=plane, mass=mass)
+            model = loaded_model(height, forces=carried, points=gated, plane=plane, mass=mass)
         judgement = self._judge.judge(
             *(state.time, preview.times),
             lambda com_band: stage_2(self._need_stage, self._com.anticipated, model, judged, com_band)[0],
@@ -156,7 +157,8 @@ class Planner:
         )
         forces = contacts.forces + carried
         if contacts.forces.any():  # hands that brace carry nothing: either force is all there is
-            model = loaded_model(preview, height, forces=forces, points=contacts.points, plane=plane, mass=mass)
+            points = held(contacts.points, preview.steps)
+            model = loaded_model(height, forces=forces, points=points, plane=plane, mass=mass)
         com_band = references.com_band(contacts, gated, sigma, foot)
         motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
         stage2 = stage_report(solution, begin)

@@ -79,14 +79,14 @@ class Posture:
         return kinematics.position(robot.palm_frames[side]), kinematics.position(robot.elbow_frames[side])
 
     @property
-    def torso_up(self) -> Vector:
-        """(3,) the torso's own vertical in world at the last iterate."""
-        return self._kinematics.rotation(self._robot.torso_frame)[:, 2]
+    def torso(self) -> Vector:
+        """(3, 3) torso to world at the last iterate, where Pinocchio keeps it: to be read at once."""
+        return self._views[4][2]
 
     @property
     def torso_heading(self) -> float:
         """Yaw of the torso at the last iterate [rad]."""
-        return heading_of(self._kinematics.rotation(self._robot.torso_frame))
+        return heading_of(self.torso)
 
     def iterate(
         self, count: int, *, soles: Vector, yaws: Vector, palms: list[PalmTarget | None], centre: Vector

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbmpc.planner.bands import UNBOUNDED, horizontal_band
+from wbmpc.jit import kernel
+from wbmpc.planner.bands import NO_FOOT, UNBOUNDED, horizontal_band
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.footstep import Feet
 from wbmpc.planner.lean import Lean
@@ -95,7 +96,7 @@ class References:
         references = np.full((len(SIDES), len(times), 3), np.nan)
         sigma = np.zeros(len(times))
         for contact in contacts.hands if contacts is not None else ():
-            if contact.goal is not None:
+            if contact.has_goal:
                 references[contact.side] = contact.preview(times)
         for task in self._tasks.current:
             sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
@@ -114,11 +115,10 @@ class References:
             palms, sigma: what `palms` answered, (2, N, 3) [m] and (N,).
             foot: shares (N,) of a stride's way; without a stride not looked at.
         """
-        places, distance = palms[:, :, :2], np.tile(self._reach_distance(contacts)[:, None], (1, len(foot), 1))
+        place = distance = NO_FOOT
         if self._stride is not None:
-            places = np.concatenate([places, self._stride.positions(foot)[None]])
-            distance = np.concatenate([distance, self._foot_distance(contacts, foot)[None]])
-        band = horizontal_band(places, distance)
+            place, distance = self._stride.positions(foot)[None], self._foot_distance(contacts, foot)[None]
+        band = horizontal_band(palms, self._reach_distance(contacts), place, distance)
         lean = self._tasks.leaning
         if lean is None:
             return band
@@ -133,9 +133,8 @@ class References:
         `sigma` (N,): the furthest task's or the stride's progress.
         """
         base = self._base(contacts).com[2]
-        wanted = np.full(len(self._times), base)
-        if self._tasks.current or self._stride is not None or self._tasks.lifting is not None:
-            wanted += sigma * (self._goal.com[2] - base)
+        goal = self._goal.com[2] if self._moves else base
+        wanted: Vector = base + sigma * (goal - base)
         for task in self._tasks.heights:
             knots = [0.0] + [w.time for w in task.waypoints]
             heights = [self._nominal_height] + [w.height for w in task.waypoints]
@@ -161,19 +160,21 @@ class References:
 
         The paper takes d as a constant of the robot; the posture makes it the constant of this target and this stance.
         """
-        distance, braced = np.full((len(SIDES), 2), UNBOUNDED), contacts.posture
+        if self._tasks.lifting is not None:
+            return np.maximum(self._lift.distance(self._tasks.lifting)[:, :2], REACH_FLOOR)
+        distance, goal = [(UNBOUNDED, UNBOUNDED)] * len(SIDES), self._goal.com
         for contact in contacts.hands:
-            if contact.goal is not None and braced is not None:
-                distance[contact.side] = np.abs(contact.goal[:2] - braced.com[:2])
-                if self._tasks.current or self._stride is not None:
-                    with_task = np.abs(contact.goal[:2] - self._goal.com[:2])
-                    distance[contact.side] = np.maximum(distance[contact.side], with_task)
+            place, braced = contact.goal, contacts.posture
+            if place is not None and braced is not None:
+                distance[contact.side] = x, y = _apart(place, braced.com)
+                if self._moves:
+                    with_task = _apart(place, goal)
+                    distance[contact.side] = max(x, with_task[0]), max(y, with_task[1])
         for task in self._tasks.current:
             if isinstance(task, Reach):
-                distance[task.side] = np.abs(task.target[:2] - self._goal.com[:2]) - self._tasks.shrink
-        if self._tasks.lifting is not None:
-            distance[:] = self._lift.distance(self._tasks.lifting)[:, :2]
-        return np.maximum(distance, REACH_FLOOR)
+                x, y = _apart(task.target, goal)
+                distance[task.side] = x - self._tasks.shrink, y - self._tasks.shrink
+        return np.array([(max(x, REACH_FLOOR), max(y, REACH_FLOOR)) for x, y in distance])
 
     def carried(self, times: Vector) -> Vector:
         """Forces (2, n, 3) [N] on the palms of what they hold, in world, `times` (n,) seconds from now."""
@@ -187,26 +188,26 @@ class References:
 
     # ------------------------------------------------------------------ now
 
-    def posture(self, contacts: Contacts) -> Vector:
-        """Joint angles (nj,) that the joint reference is drawn to: standing or braced, the task's by its progress."""
-        base = self._base(contacts).q
-        return base[7:] + self._sigma * (self._goal.q[7:] - base[7:])
+    def attitude(self, contacts: Contacts, feet: float) -> tuple[Vector, Vector, float]:
+        """Where the joint reference is drawn to: standing or braced, the task's posture by its progress.
 
-    def torso_up(self, contacts: Contacts) -> Vector:
-        """Where the torso's own vertical should point (3,), in world: as in those postures."""
-        base = self._base(contacts).torso_up
-        return base + self._sigma * (self._goal.torso_up - base)
+        Joint angles (nj,), the torso's own vertical (3,) in world, and its yaw [rad]: that of the feet, `feet`, or the
+        postures'.
+        """
+        base, goal, braced, share = self._base(contacts), self._goal, contacts.posture, self._sigma
+        posture, torso_up = _between(base.q, goal.q, base.torso, goal.torso, share)
+        heading = feet if braced is None else feet + angle_difference(braced.torso_heading, feet)
+        return posture, torso_up, heading + share * angle_difference(goal.torso_heading, heading)
+
+    @property
+    def _moves(self) -> bool:
+        """Whether a task or a stride is there that ends elsewhere than the robot is."""
+        return bool(self._tasks.current) or self._stride is not None or self._tasks.lifting is not None
 
     @property
     def _sigma(self) -> float:
         """Progress of the furthest task or the stride."""
         return self._tasks.sigma if self._stride is None else max(self._tasks.sigma, self._stride.sigma)
-
-    def torso_heading(self, contacts: Contacts, feet: float) -> float:
-        """Yaw of the torso [rad]: the feet's, `feet`, or as in those postures."""
-        braced = contacts.posture
-        base = feet if braced is None else feet + angle_difference(braced.torso_heading, feet)
-        return base + self._sigma * angle_difference(self._goal.torso_heading, base)
 
     def spent(self, contacts: Contacts) -> tuple[int, ...]:
         """Sides of contacts that a stride's end leaves out of the palm's reach."""
@@ -234,3 +235,20 @@ class References:
     def goal_com(self) -> Vector | None:
         """CoM (3,) [m] where the current task ends; None when none is on its way or holding."""
         return self._goal.com if self._stride is not None or self._tasks.ahead else None
+
+
+def _apart(a: Vector, b: Vector) -> tuple[float, float]:
+    """Horizontal distances along the world's axes of two places (3,) [m]."""
+    return abs(float(a[0]) - float(b[0])), abs(float(a[1]) - float(b[1]))
+
+
+@kernel
+def _between(base: Vector, goal: Vector, torso: Vector, goal_torso: Vector, share: float) -> tuple[Vector, Vector]:
+    """Joint angles and torso's vertical a `share` of the way from `base` (nq,) with `torso` (3, 3) to `goal`."""
+    n = len(base) - 7
+    posture, up = np.empty(n), np.empty(3)
+    for i in range(n):
+        posture[i] = base[7 + i] + share * (goal[7 + i] - base[7 + i])
+    for i in range(3):
+        up[i] = torso[i, 2] + share * (goal_torso[i, 2] - torso[i, 2])
+    return posture, up
