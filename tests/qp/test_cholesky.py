@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from wbmpc.qp.cholesky import add_product, backward, factor, forward, forward_all, products_of_columns, substitute
+from wbmpc.qp.cholesky import (
+    add_product,
+    add_squares,
+    backward,
+    factor,
+    forward,
+    forward_all,
+    products_of_columns,
+    substitute,
+)
 from wbmpc.signals import Vector
 
 
@@ -53,3 +62,7 @@ def test_products(n: int, columns: int) -> None:
     add_product(A, x, y)
     assert_allclose(y[:n], start[:n] + A @ x, atol=1e-12)
     assert y[n] == start[n]
+    H, g, b, w = np.zeros((columns, columns)), np.zeros(columns), rng.normal(size=n), rng.random(n)
+    add_squares(H, g, A, b, w)
+    assert_allclose(H, np.tril(A.T @ (w[:, None] * A)), atol=1e-12)
+    assert_allclose(g, -A.T @ (w * b), atol=1e-12)

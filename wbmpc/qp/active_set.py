@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from wbmpc.jit import kernel
 from wbmpc.qp.cholesky import add_product, backward, factor, forward, forward_all, products_of_columns, substitute
+from wbmpc.qp.verdicts import SOUND, soundness
 from wbmpc.signals import Vector
 
 MOST_ROUNDS = 6
@@ -149,3 +150,22 @@ def solve_from_guess(
             return rounds, x
     active[:] = 0
     return nothing
+
+
+@kernel
+def examine_and_guess(
+    hessian: Vector,
+    gradient: Vector,
+    matrix: Vector,
+    all_lower: Vector,
+    all_upper: Vector,
+    softness: Vector,
+    active: NDArray[np.int8],
+    matrices_changed: bool,
+) -> tuple[int, int, Vector]:
+    """The data's `soundness`, then what `solve_from_guess` finds; nothing when they are not SOUND."""
+    verdict = soundness(hessian.reshape(-1), gradient, matrix.reshape(-1), all_lower, all_upper, matrices_changed)
+    if verdict != SOUND:
+        return verdict, 0, np.empty(0)
+    rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active)
+    return verdict, rounds, x

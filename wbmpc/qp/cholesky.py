@@ -105,3 +105,21 @@ def backward(U, b, n):  # type: ignore[no-untyped-def]
         for k in range(j + 1, n):
             rest -= U[j, k] * b[k]
         b[j] = rest / U[j, j]
+
+
+@short_kernel
+def add_squares(H, g, A, b, w):  # type: ignore[no-untyped-def]
+    """Add Σ w (A x − b)² / 2 to ½ xᵀ H x + gᵀ x: Aᵀ W A, its lower triangle only, and −Aᵀ W b."""
+    n, rows = len(g), len(A)
+    whole = rows - rows % 4
+    for i in range(n):
+        for r in range(0, whole, 4):
+            a, c, d, e = w[r] * A[r, i], w[r + 1] * A[r + 1, i], w[r + 2] * A[r + 2, i], w[r + 3] * A[r + 3, i]
+            for k in range(i + 1):
+                H[i, k] = (((H[i, k] + a * A[r, k]) + c * A[r + 1, k]) + d * A[r + 2, k]) + e * A[r + 3, k]
+        for r in range(whole, rows):
+            a = w[r] * A[r, i]
+            for k in range(i + 1):
+                H[i, k] += a * A[r, k]
+        for r in range(rows):
+            g[i] -= w[r] * A[r, i] * b[r]
