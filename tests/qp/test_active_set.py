@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from numpy.testing import assert_allclose
 from random_problems import kkt_residual, random_problem
 
 from wbmpc.qp import QuadraticProgram, daqp_workspace, make_workspace
-from wbmpc.qp.active_set import MOST_ROUNDS, solve_from_guess
+from wbmpc.qp.active_set import MOST_ROUNDS, examine_and_guess, solve_from_guess
 from wbmpc.signals import SolveStatus, Vector
 
 
@@ -75,12 +76,12 @@ def test_a_workspace_that_guesses_follows_changing_data(problem: QuadraticProgra
 def test_a_workspace_mostly_guesses_right_while_the_data_change_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
     rng, rounds = np.random.default_rng(8), []
 
-    def counted(*arguments: Vector) -> tuple[int, Vector]:
-        answer = solve_from_guess(*arguments)
-        rounds.append(answer[0])
+    def counted(*arguments: Any) -> tuple[int, int, Vector]:
+        answer = examine_and_guess(*arguments)
+        rounds.append(answer[1])
         return answer
 
-    monkeypatch.setattr(daqp_workspace, "solve_from_guess", counted)
+    monkeypatch.setattr(daqp_workspace, "examine_and_guess", counted)
     problem = random_problem(rng, 30, 60, soft=30)
     workspace = make_workspace("daqp", problem)
     for _ in range(100):

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wbmpc.jit import kernel
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
-from wbmpc.qp.cholesky import factor, forward
+from wbmpc.qp.cholesky import add_squares, factor, forward
 from wbmpc.signals import Vector
 
 FOOT_ROWS = 12  # two soles, six rows each
@@ -50,8 +51,13 @@ class VelocityCost:
 
     def slope(self, velocity: Vector) -> Vector:
         """Gradient (2,) at `velocity` (2,), were it in the same piece."""
-        slope: Vector = self.gradient + self.curvature @ (velocity - self.at)
+        slope: Vector = _slope(self.at, self.gradient, self.curvature, velocity)
         return slope
+
+    def error(self, there: VelocityCost) -> float:
+        """How far the slope foreseen at another piece's velocity is from the one found there [cost / (m/s)]."""
+        error: float = _error(self.at, self.gradient, self.curvature, there.at, there.gradient)
+        return error
 
 
 class JointVelocities:
@@ -68,7 +74,8 @@ class JointVelocities:
         self._workspace = make_workspace(backend, self.problem)
         self._tasks: VelocityTasks | None = None
         self._fresh = True
-        self._base_gradient = np.zeros(velocities)
+        self._base_gradient = np.zeros(velocities)  # at no CoM velocity
+        self._free, self._curvature = np.zeros(velocities, dtype=np.bool_), np.zeros((2, 2))  # of `cost`
         self.cost: VelocityCost | None = None  # as last solved for these tasks
 
     def take(self, tasks: VelocityTasks) -> None:
@@ -78,40 +85,69 @@ class JointVelocities:
         self._tasks, self._fresh, self.cost = tasks, True, None
         qp, settings = self.problem, self._settings
         _write(
-            *(qp.hessian, self._base_gradient),
+            *(qp.hessian, self._base_gradient, qp.x_lower, qp.x_upper),
             *(settings.com_velocity_cost, settings.hand_velocity_cost, settings.torso_cost, settings.foot_slack_cost),
             settings.joint_velocity_cost,
-            *(tasks.com_jacobian, tasks.com_correction[2] + tasks.com_vertical_velocity),
+            *(tasks.com_jacobian, tasks.com_correction, tasks.com_vertical_velocity),
             *(tasks.hand_jacobian, tasks.hand_velocity, tasks.hand_active),
             *(tasks.torso_jacobian, tasks.torso_velocity),
             *(tasks.foot_jacobian, tasks.foot_velocity),
-            *(tasks.posture_weight, tasks.posture_velocity),
+            *(tasks.posture_weight, tasks.posture_velocity, tasks.lower, tasks.upper),
         )
-        qp.x_lower[:], qp.x_upper[:] = tasks.lower, tasks.upper
 
     def solve(self, velocity: Vector) -> tuple[QpSolution, VelocityCost | None]:
         """q̇ (nv,) for the CoM velocity `velocity` (2,) [m/s], and V there; None when the solve failed."""
         assert self._tasks is not None
-        qp, weight, jacobian = self.problem, self._settings.com_velocity_cost, self._tasks.com_jacobian
-        qp.gradient[:] = self._base_gradient - weight * (velocity @ jacobian[:2])
-        solution = self._workspace.solve(matrices_changed=self._fresh)
+        qp, weight, jacobian, fresh = (
+            self.problem,
+            self._settings.com_velocity_cost,
+            self._tasks.com_jacobian,
+            self._fresh,
+        )
+        _turn(qp.gradient, self._base_gradient, weight, velocity, jacobian)
+        solution = self._workspace.solve(matrices_changed=fresh)
         self._fresh, self.cost = not solution.solved, None
         if solution.solved:
-            slope, curvature = _cost(solution.x, velocity, jacobian, qp.hessian, qp.x_lower, qp.x_upper, weight)
-            self.cost = VelocityCost(velocity, slope, curvature)
+            slope, self._curvature = _cost(
+                *(solution.x, velocity, jacobian, qp.hessian, qp.x_lower, qp.x_upper, weight),
+                *(fresh, self._free, self._curvature),
+            )
+            self.cost = VelocityCost(velocity, slope, self._curvature)
         return solution, self.cost
+
+
+@kernel
+def _slope(at: Vector, gradient: Vector, curvature: Vector, velocity: Vector) -> Vector:
+    return gradient + curvature @ (velocity - at)
+
+
+@kernel
+def _error(at: Vector, gradient: Vector, curvature: Vector, velocity: Vector, found: Vector) -> float:
+    foreseen = _slope(at, gradient, curvature, velocity)
+    return max(abs(found[0] - foreseen[0]), abs(found[1] - foreseen[1]))
+
+
+@kernel
+def _turn(gradient: Vector, base: Vector, weight: float, velocity: Vector, jacobian: Vector) -> None:
+    """Gradient for a horizontal CoM velocity: −w Jᵀ v added to `base`."""
+    pull = velocity @ jacobian[:2]
+    for i in range(len(gradient)):
+        gradient[i] = base[i] - weight * pull[i]
 
 
 @kernel
 def _write(
     hessian: Vector,
     gradient: Vector,
+    x_lower: Vector,
+    x_upper: Vector,
     com_cost: float,
     hand_cost: float,
     torso_cost: float,
     foot_cost: float,
     joint_cost: float,
     com: Vector,
+    com_correction: Vector,
     com_z: float,
     hand: Vector,
     hand_velocity: Vector,
@@ -122,59 +158,75 @@ def _write(
     foot_velocity: Vector,
     posture_weight: Vector,
     posture_velocity: Vector,
+    lower: Vector,
+    upper: Vector,
 ) -> None:
-    """Hessian, and the gradient at v = 0: Σ w Jᵀ J and −Σ w Jᵀ v of all tasks."""
+    """Bounds, Hessian, and the gradient at v = 0: Σ w Jᵀ J and −Σ w Jᵀ v of all tasks."""
     nv = len(gradient)
     jacobian, wanted, weight = np.empty((12 + len(foot), nv)), np.zeros(12 + len(foot)), np.empty(12 + len(foot))
-    jacobian[:3], jacobian[3:9], jacobian[9:12], jacobian[12:] = com, hand, torso, foot
-    wanted[2], wanted[3:9], wanted[9:12], wanted[12:] = com_z, hand_velocity, torso_velocity, foot_velocity
-    weight[:3], weight[9:12], weight[12:] = com_cost, torso_cost, foot_cost
-    for i in range(6):
-        weight[3 + i] = hand_cost * hand_active[i // 3]
-    hessian[:] = 0.0
-    gradient[:] = 0.0
-    for row in range(len(weight)):
-        if weight[row] == 0.0:
-            continue
-        for i in range(nv):
-            scaled = weight[row] * jacobian[row, i]
-            gradient[i] -= scaled * wanted[row]
-            for j in range(i + 1):
-                hessian[i, j] += scaled * jacobian[row, j]
+    jacobian[:3], wanted[2], weight[:3] = com, com_correction[2] + com_z, com_cost
+    rows = 3
+    for side in range(2):
+        if hand_active[side] != 0.0:
+            task = slice(3 * side, 3 * side + 3)
+            jacobian[rows : rows + 3], wanted[rows : rows + 3] = hand[task], hand_velocity[task]
+            weight[rows : rows + 3] = hand_cost * hand_active[side]
+            rows += 3
+    jacobian[rows : rows + 3], wanted[rows : rows + 3], weight[rows : rows + 3] = torso, torso_velocity, torso_cost
+    rows += 3
+    end = rows + len(foot)
+    jacobian[rows:end], wanted[rows:end], weight[rows:end] = foot, foot_velocity, foot_cost
+    hessian[:], gradient[:] = 0.0, 0.0
+    add_squares(hessian, gradient, jacobian[:end], wanted, weight)
     for i in range(nv):
         hessian[i, i] += joint_cost * posture_weight[i]
         gradient[i] -= joint_cost * posture_weight[i] * posture_velocity[i]
+        x_lower[i], x_upper[i] = lower[i], upper[i]
         for j in range(i):
             hessian[j, i] = hessian[i, j]
 
 
 @kernel
 def _cost(
-    x: Vector, velocity: Vector, jacobian: Vector, hessian: Vector, lower: Vector, upper: Vector, weight: float
+    x: Vector,
+    velocity: Vector,
+    jacobian: Vector,
+    hessian: Vector,
+    lower: Vector,
+    upper: Vector,
+    weight: float,
+    fresh: bool,
+    free: NDArray[np.bool_],
+    known: Vector,
 ) -> tuple[Vector, Vector]:
     """Gradient (2,) and curvature (2, 2) of V at the solution x: the joints at their bounds stay there.
 
-    ∇V = w (v − J q̇),   ∇²V = w (1 − w J_f H_ff⁻¹ J_fᵀ)   over the joints f that are free.
+    ∇V = w (v − J q̇),   ∇²V = w (1 − w J_f H_ff⁻¹ J_fᵀ)   over the joints f that are free. `free` (nv,) is those of the
+    last solve and becomes this one's; the curvature is `known` if they are the same and the matrices not `fresh`.
     """
-    count, free = 0, np.empty(len(x), np.int64)
-    slope, curvature = velocity.copy(), np.zeros((2, 2))
+    changed, slope = fresh, velocity.copy()
     for i in range(len(x)):
         for a in range(2):
             slope[a] -= jacobian[a, i] * x[i]
-        if lower[i] + AT_BOUND < x[i] < upper[i] - AT_BOUND:
-            free[count] = i
-            count += 1
+        is_free = lower[i] + AT_BOUND < x[i] < upper[i] - AT_BOUND
+        changed |= free[i] != is_free
+        free[i] = is_free
+    for a in range(2):
+        slope[a] *= weight
+    if not changed:
+        return slope, known
+    joints = np.flatnonzero(free)
+    count, curvature = len(joints), np.zeros((2, 2))
     U, follows = np.empty((count, count)), np.empty((2, count))
     for f in range(count):
         for a in range(2):
-            follows[a, f] = jacobian[a, free[f]]
+            follows[a, f] = jacobian[a, joints[f]]
         for g in range(f, count):
-            U[f, g] = hessian[free[f], free[g]]
+            U[f, g] = hessian[joints[f], joints[g]]
     factor(U, count)
     for a in range(2):
         forward(U, follows[a], count)
     for a in range(2):
-        slope[a] *= weight
         curvature[a, a] = weight
         for b in range(2):
             for f in range(count):

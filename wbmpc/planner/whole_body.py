@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from wbmpc.planner.horizontal_motion import HorizontalMotion, Motion, ZmpModel
 from wbmpc.planner.joint_velocities import JointVelocities, VelocityTasks
 from wbmpc.planner.preview import Preview
@@ -109,12 +107,12 @@ class WholeBodyStage:
             if motion is None:
                 return None, solution
             velocity = unmoved + gain * motion.jerk[0]
-            foreseen = cost.slope(velocity)
+            foreseen = cost
             answer, cost = joints.solve(velocity)
             if cost is None:
                 return None, answer
             plan = _with_joints(motion, answer.x)
-            if np.abs(cost.gradient - foreseen).max() <= SLOPE_TOLERANCE:
+            if foreseen.error(cost) <= SLOPE_TOLERANCE:
                 break
         return plan, solution
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.jit import kernel
-from wbmpc.qp.cholesky import factor, forward, substitute
+from wbmpc.qp.cholesky import add_product, backward, factor, forward, forward_all, products_of_columns, substitute
+from wbmpc.qp.verdicts import SOUND, soundness
 from wbmpc.signals import Vector
 
 MOST_ROUNDS = 6
@@ -41,76 +42,75 @@ def solve_from_guess(
     """
     n, m = len(gradient), len(softness)
     x, nothing = np.empty(n), (0, np.empty(0))
-    U, z, free = np.empty((n, n)), np.empty(n), np.empty(n, np.int64)
-    most = min(m, 2 * n)  # active rows; soft ones may be more than the variables
-    Y, rows = np.empty((most, n)), np.empty(most, np.int64)
-    gram, square, multiplier = np.empty((most, most)), np.empty(most), np.empty(most)
+    U, start, z, free = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n, np.int64)
+    rows, value = np.empty(m, np.int64), np.empty(m)
+    count, refactor = 0, True
     for rounds in range(1, MOST_ROUNDS + 1):
-        count = 0
-        for i in range(n):
-            if active[i] == 0:
-                free[count] = i
-                count += 1
-            else:
-                x[i] = all_upper[i] if active[i] > 0 else all_lower[i]
-        for a in range(count):
-            i = free[a]
-            z[a] = -gradient[i]
-            for b in range(a, count):
-                U[a, b] = hessian[i, free[b]]
-            if count < n:
-                for j in range(n):
-                    if active[j] != 0:
-                        z[a] -= hessian[i, j] * x[j]
-        if not factor(U, count):
-            break
-        forward(U, z, count)
+        if refactor:
+            count = 0
+            for i in range(n):
+                if active[i] == 0:
+                    free[count] = i
+                    count += 1
+                else:
+                    x[i] = all_upper[i] if active[i] > 0 else all_lower[i]
+            for a in range(count):
+                i = free[a]
+                start[a] = -gradient[i]
+                for b in range(a, count):
+                    U[a, b] = hessian[i, free[b]]
+                if count < n:
+                    for j in range(n):
+                        if active[j] != 0:
+                            start[a] -= hessian[i, j] * x[j]
+            if not factor(U, count):
+                break
+            forward(U, start, count)
+        z[:count] = start[:count]
         held = 0
         for r in range(m):
-            if active[n + r] == 0:
-                continue
-            if held == most:
-                active[:] = 0
-                return nothing
+            if active[n + r] != 0:
+                rows[held] = r
+                held += 1
+        if held > 2 * n:  # soft rows may be more than the variables
+            break
+        Y, multiplier, square = np.empty((count, held)), np.empty(held), np.empty(held)
+        gram = np.empty((held, held))
+        for c in range(held):
+            r = rows[c]
             bound = all_upper[n + r] if active[n + r] > 0 else all_lower[n + r]
             for a in range(count):
-                Y[held, a] = matrix[r, free[a]]
+                Y[a, c] = matrix[r, free[a]]
             if count < n:
                 for j in range(n):
                     if active[j] != 0:
                         bound -= matrix[r, j] * x[j]
-            forward(U, Y[held], count)
-            rows[held], multiplier[held] = r, -bound
-            held += 1
+            multiplier[c] = -bound
+        forward_all(U, Y, count)
+        for a in range(count):
+            for c in range(held):
+                multiplier[c] += Y[a, c] * z[a]
+        products_of_columns(Y, gram)
         for c in range(held):
-            for a in range(count):
-                multiplier[c] += Y[c, a] * z[a]
-            for d in range(c, held):
-                gram[c, d] = 0.0
-                for a in range(count):
-                    gram[c, d] += Y[c, a] * Y[d, a]
             gram[c, c] += softness[rows[c]]
             square[c] = gram[c, c]
         if not factor(gram, held):
             break
+        dependent = False
         for c in range(held):
-            if gram[c, c] ** 2 < DEPENDENT * square[c]:
-                active[:] = 0
-                return nothing
+            dependent |= gram[c, c] ** 2 < DEPENDENT * square[c]
+        if dependent:
+            break
         substitute(gram, multiplier, held)
-        for c in range(held):
-            for a in range(count):
-                z[a] -= multiplier[c] * Y[c, a]
-        for a in range(count - 1, -1, -1):
-            rest = z[a]
-            for b in range(a + 1, count):
-                rest -= U[a, b] * z[b]
-            z[a] = rest / U[a, a]
+        add_product(Y, -multiplier, z)
+        backward(U, z, count)
+        finite = True
+        for a in range(count):
             x[free[a]] = z[a]
-            if not np.isfinite(z[a]):
-                active[:] = 0
-                return nothing
-        changed = False
+            finite &= np.isfinite(z[a])
+        if not finite:
+            break
+        changed = refactor = False
         if count < n:
             for j in range(n):
                 if active[j] == 0 or all_lower[j] == all_upper[j]:
@@ -121,7 +121,7 @@ def solve_from_guess(
                 for c in range(held):
                     slope += multiplier[c] * matrix[rows[c], j]
                 if slope * active[j] > TOLERANCE * (1.0 + size):
-                    active[j], changed = 0, True
+                    active[j], refactor = 0, True
         for c in range(held):
             r = n + rows[c]
             if multiplier[c] * active[r] < 0.0 and all_lower[r] != all_upper[r]:
@@ -129,24 +129,43 @@ def solve_from_guess(
         for a in range(count):
             i = free[a]
             if x[i] > all_upper[i] + TOLERANCE * (1.0 + abs(all_upper[i])):
-                active[i], changed = 1, True
+                active[i], refactor = 1, True
             elif x[i] < all_lower[i] - TOLERANCE * (1.0 + abs(all_lower[i])):
-                active[i], changed = -1, True
+                active[i], refactor = -1, True
+        value[:] = 0.0
+        add_product(matrix, x, value)
         c = 0
         for r in range(m):
             if c < held and rows[c] == r:  # what has just left stays out of this round
                 c += 1
                 continue
-            value, low, high = 0.0, all_lower[n + r], all_upper[n + r]
+            low, high = all_lower[n + r], all_upper[n + r]
             if low == -np.inf and high == np.inf:
                 continue
-            for j in range(n):
-                value += matrix[r, j] * x[j]
-            if not value <= high + TOLERANCE * (1.0 + abs(high)):  # nor nan
+            if not value[r] <= high + TOLERANCE * (1.0 + abs(high)):  # nor nan
                 active[n + r], changed = 1, True
-            elif value < low - TOLERANCE * (1.0 + abs(low)):
+            elif value[r] < low - TOLERANCE * (1.0 + abs(low)):
                 active[n + r], changed = -1, True
-        if not changed:
+        if not (changed or refactor):
             return rounds, x
     active[:] = 0
     return nothing
+
+
+@kernel
+def examine_and_guess(
+    hessian: Vector,
+    gradient: Vector,
+    matrix: Vector,
+    all_lower: Vector,
+    all_upper: Vector,
+    softness: Vector,
+    active: NDArray[np.int8],
+    matrices_changed: bool,
+) -> tuple[int, int, Vector]:
+    """The data's `soundness`, then what `solve_from_guess` finds; nothing when they are not SOUND."""
+    verdict = soundness(hessian.reshape(-1), gradient, matrix.reshape(-1), all_lower, all_upper, matrices_changed)
+    if verdict != SOUND:
+        return verdict, 0, np.empty(0)
+    rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active)
+    return verdict, rounds, x

@@ -9,8 +9,8 @@ import daqp
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.qp.active_set import solve_from_guess
-from wbmpc.qp.problem import QuadraticProgram
+from wbmpc.qp.active_set import examine_and_guess
+from wbmpc.qp.problem import DEFECTS, QuadraticProgram
 from wbmpc.qp.slack_form import SlackForm
 from wbmpc.qp.solution import QpSolution, failed
 from wbmpc.qp.verdicts import closes_duality_gap
@@ -61,16 +61,16 @@ class DaqpWorkspace:
         """See `QpWorkspace.solve`."""
         start = perf_counter()
         problem = self.problem
-        defect = problem.defect(matrices_changed=matrices_changed or self._model is None)
+        verdict, rounds, x = examine_and_guess(
+            *(problem.hessian, problem.gradient, problem.matrix, problem.all_lower, problem.all_upper),
+            *(self._softness, self._active, matrices_changed or self._model is None),
+        )
+        defect = DEFECTS[verdict]
         if defect is not None:
             if matrices_changed:
                 self._model = None  # its factorisation no longer belongs to the matrices
             return failed(problem, defect, 0, perf_counter() - start)
         self._stale |= matrices_changed
-        rounds, x = solve_from_guess(
-            *(problem.hessian, problem.gradient, problem.matrix, problem.all_lower, problem.all_upper),
-            *(self._softness, self._active),
-        )
         if rounds:
             return QpSolution(x, SolveStatus.SOLVED, rounds, perf_counter() - start)
         if self._model is not None:

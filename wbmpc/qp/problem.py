@@ -12,7 +12,11 @@ from wbmpc.errors import WbmpcError
 from wbmpc.qp.verdicts import CROSSING, NOT_FINITE, SOUND, soundness
 from wbmpc.signals import SolveStatus, Vector
 
-_DEFECTS = {SOUND: None, NOT_FINITE: SolveStatus.NUMERICAL_ERROR, CROSSING: SolveStatus.INFEASIBLE}
+DEFECTS: dict[int, SolveStatus | None] = {
+    SOUND: None,
+    NOT_FINITE: SolveStatus.NUMERICAL_ERROR,
+    CROSSING: SolveStatus.INFEASIBLE,
+}
 
 
 class QuadraticProgram:
@@ -104,7 +108,7 @@ class QuadraticProgram:
         None when the data are sound.
         """
         H, A = self._matrix_data
-        return _DEFECTS[soundness(H, self.gradient, A, self.all_lower, self.all_upper, matrices_changed)]
+        return DEFECTS[soundness(H, self.gradient, A, self.all_lower, self.all_upper, matrices_changed)]
 
     def binary_range(self) -> tuple[Vector, Vector]:
         """Smallest and largest value, 0 or 1, that each binary's own bounds admit; (1, 0) when they admit neither."""
