@@ -41,6 +41,16 @@ def test_a_changed_callee_in_another_file_compiles_its_caller_anew(tmp_path: Pat
     assert printed(code, tmp_path) == "100.0 0"
 
 
+def test_a_caller_can_be_compiled_after_its_callee_has_forgotten_its_source(tmp_path: Path) -> None:
+    (tmp_path / "callee.py").write_text(CALLEE.format(factor=3.0))
+    (tmp_path / "caller.py").write_text(CALLER)
+    load = "import callee; callee.share(1.0); "
+    printed(load, tmp_path)
+    forget = "from wbmpc.jit import forget_sources; forget_sources(); forget_sources(); "
+    code = f"{load}{forget}import caller; print(caller.twice(1.0), sum(callee.share.stats.cache_hits.values()))"
+    assert printed(code, tmp_path) == "6.0 1"
+
+
 def test_without_a_compiler_kernels_are_plain_python(tmp_path: Path) -> None:
     code = (
         "import numpy as np; from wbmpc.loop import within; "

@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 from threading import Timer
 
+from wbmpc.jit import forget_sources
 from wbmpc.loop import run_lockstep
 from wbmpc.recorder import Recorder
 from wbmpc.robot import Robot
@@ -39,6 +40,7 @@ def compile_kernels() -> None:
     with _announced():
         robot = Robot.load(robot_path(brief))
         run_lockstep(brief, robot=robot, recorder=Recorder(robot, expected_ticks=round(BRIEF * 1e3)))
+    forget_sources()
 
 
 @contextmanager

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from robots import palms, soles, surena
 
+from wbmpc.kinematics import Kinematics
 from wbmpc.planner.bands import UNBOUNDED
 from wbmpc.planner.carry import Carry
 from wbmpc.planner.footstep import Feet
@@ -29,7 +30,7 @@ def lift() -> Lift:
 
 
 def settled(it: Lift, *, after: Feet = BEFORE, centre: Vector | None = None) -> LiftPostures:
-    postures = LiftPostures(ROBOT, nominal=HOME)
+    postures = LiftPostures(Kinematics(ROBOT), nominal=HOME)
     for _ in range(60):
         middle = BEFORE.positions[:, :2].mean(axis=0) if centre is None else centre
         postures.iterate(2, it, before=BEFORE, after=after, centre=middle)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbmpc.kinematics import Kinematics
 from wbmpc.planner.candidate_reports import FALLS_SHORT, NO_COST, Reach, Weighed, friction_margin, weigh
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need
@@ -73,8 +74,9 @@ class Candidates:
     ) -> None:
         self._robot, self._settings, self._keep_out = robot, settings, keep_out
         targets = [PalmTarget(p.position + robot.palm_radius * p.normal, p.normal) for p in patches]
+        kinematics = Kinematics(robot)
         self.all = [
-            Candidate(patch, hand, Posture(robot, nominal=nominal, com_cost=COM_COST), target)
+            Candidate(patch, hand, Posture(kinematics, nominal=nominal, com_cost=COM_COST), target)
             for patch, target in zip(patches, targets, strict=True)
             for hand in range(len(SIDES))
         ]

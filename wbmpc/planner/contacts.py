@@ -6,6 +6,7 @@ from time import perf_counter
 
 import numpy as np
 
+from wbmpc.kinematics import Kinematics
 from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need
@@ -51,7 +52,7 @@ class Contacts:
             robot, patches, contact, keep_out=keep_out, nominal=nominal, backend=settings.miqp_backend
         )
         self._force_stage = make_force_stage(settings, mass=robot.mass, steps=len(times), contacts=len(SIDES))
-        self._together = Posture(robot, nominal=nominal, com_cost=TOGETHER_COST)
+        self._together = Posture(Kinematics(robot), nominal=nominal, com_cost=TOGETHER_COST)
         self.forces = np.zeros((len(SIDES), len(times), 3))  # [N] planned, in world
         self._needed, self._quiet = False, True  # of the shift as a whole
         self._short = False  # the contacts there are cannot give it

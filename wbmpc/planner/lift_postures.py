@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from wbmpc.kinematics import Kinematics
 from wbmpc.planner.bands import UNBOUNDED
 from wbmpc.planner.footstep import Feet
 from wbmpc.planner.lift import Lift
 from wbmpc.planner.posture import PalmTarget, Posture
-from wbmpc.robot import Robot
 from wbmpc.signals import Vector
 
 COM_COST = 10.0  # [cost / m²] how hard they keep the CoM over the feet
@@ -19,10 +19,10 @@ SLACK = 0.01  # [m] of d of the hands that lift
 class LiftPostures:
     """Low and high: the box where it is taken and where it is held; on the way, before a stride and after it."""
 
-    def __init__(self, robot: Robot, *, nominal: Vector) -> None:
+    def __init__(self, kinematics: Kinematics, *, nominal: Vector) -> None:
         """`nominal` (nq,): the posture to deviate from as little as possible."""
         self.low, self.high = (
-            Posture(robot, nominal=nominal, com_cost=COM_COST, tilt_cost=TILT_COST) for _ in range(2)
+            Posture(kinematics, nominal=nominal, com_cost=COM_COST, tilt_cost=TILT_COST) for _ in range(2)
         )
 
     def iterate(self, iterations: int, lift: Lift, *, before: Feet, after: Feet, centre: Vector) -> None:

@@ -11,7 +11,6 @@ from wbmpc.frame_terms import chains_of
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.posture_kernel import Targets, posture_step
 from wbmpc.planner.support import UNEVEN
-from wbmpc.robot import Robot
 from wbmpc.rotations import heading_of, level_frame
 from wbmpc.signals import Vector
 
@@ -38,14 +37,16 @@ class Posture:
     started from the last, keep it current while targets move.
     """
 
-    def __init__(self, robot: Robot, *, nominal: Vector, com_cost: float, tilt_cost: float = 0.0) -> None:
+    def __init__(self, kinematics: Kinematics, *, nominal: Vector, com_cost: float, tilt_cost: float = 0.0) -> None:
         """Start from `nominal` (nq,), the posture to deviate from as little as possible.
 
-        `com_cost`: w [cost / m²]; `tilt_cost`: w_t [cost / rad²].
+        `kinematics` to compute with, which postures may share: a `pin.Data` is more than 1 MB, and nothing is left in
+        it from one call to the next. `com_cost`: w [cost / m²]; `tilt_cost`: w_t [cost / rad²].
         """
+        robot = kinematics.robot
         self._robot, self._nominal, self._com_cost = robot, nominal.copy(), com_cost
         self.tilt_cost = tilt_cost  # [cost / rad²]
-        self._kinematics = Kinematics(robot)
+        self._kinematics = kinematics
         self._kinematics.update_kinematics(nominal)
         self._height = float(self._kinematics.com[2])
         feet = np.array([self._kinematics.position(f) for f in robot.sole_frames])
@@ -63,6 +64,7 @@ class Posture:
         frames = (*robot.sole_frames, *robot.palm_frames, *robot.elbow_frames, robot.torso_frame)
         self._views = self._kinematics.views(frames[:6], (*robot.sole_frames, robot.torso_frame))
         self._chains = chains_of(robot.pin_model, frames)
+        self._look()
         self._told = Targets(
             *(np.zeros((2, 3)), np.zeros(2), np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2, np.int64), np.zeros(3))
         )
@@ -75,13 +77,12 @@ class Posture:
 
     def forearm(self, side: int) -> tuple[Vector, Vector]:
         """Palm and elbow (3,) of an arm in world [m] at the last iterate."""
-        kinematics, robot = self._kinematics, self._robot
-        return kinematics.position(robot.palm_frames[side]), kinematics.position(robot.elbow_frames[side])
+        return self._places[2 + side], self._places[4 + side]
 
     @property
     def torso(self) -> Vector:
-        """(3, 3) torso to world at the last iterate, where Pinocchio keeps it: to be read at once."""
-        return self._views[4][2]
+        """(3, 3) torso to world at the last iterate."""
+        return self._torso
 
     @property
     def torso_heading(self) -> float:
@@ -91,7 +92,7 @@ class Posture:
     def iterate(
         self, count: int, *, soles: Vector, yaws: Vector, palms: list[PalmTarget | None], centre: Vector
     ) -> None:
-        """Run `count` iterations.
+        """Run `count` iterations, at least one.
 
         Args:
             soles: (2, 3) sole positions in world [m].
@@ -135,8 +136,14 @@ class Posture:
             np.minimum(joints, self._upper, out=joints)
             self._step = self._found[4]
         self.com = self._kinematics.com
+        self._look()
         self.palm_errors = self._found[:2].copy()
         self.residual, self.elbow_excess = float(self._found[2]), float(self._found[3])
+
+    def _look(self) -> None:
+        """Copy what others may ask of the configuration that Pinocchio has just computed."""
+        _, _, _, places, rotations = self._views
+        self._places, self._torso = np.array(places), rotations[2].copy()  # (6, 3) [m] soles, palms, elbows; (3, 3)
 
     def _start(self, soles: Vector, yaws: Vector) -> Vector:
         """The nominal posture (nq,) over the feet: from afar the way there ends in a contorted optimum."""

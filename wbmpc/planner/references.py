@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.jit import kernel
+from wbmpc.kinematics import Kinematics
 from wbmpc.planner.bands import NO_FOOT, UNBOUNDED, horizontal_band
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.footstep import Feet
@@ -35,10 +36,11 @@ class References:
     def __init__(self, robot: Robot, tasks: Tasks, *, q: Vector, height: float, times: Vector) -> None:
         """Start with the posture `q` (nq,) and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
         self._tasks, self._times, self._nominal_height = tasks, times, height
-        self._stand = Posture(robot, nominal=q, com_cost=COM_COST)
-        self._reach_goal = Posture(robot, nominal=q, com_cost=COM_COST)
-        self._lean_goal = Posture(robot, nominal=q, com_cost=LEAN_COST)
-        self._lift = LiftPostures(robot, nominal=q)
+        kinematics = Kinematics(robot)
+        self._stand = Posture(kinematics, nominal=q, com_cost=COM_COST)
+        self._reach_goal = Posture(kinematics, nominal=q, com_cost=COM_COST)
+        self._lean_goal = Posture(kinematics, nominal=q, com_cost=LEAN_COST)
+        self._lift = LiftPostures(kinematics, nominal=q)
         self._stride: Stride | None = None
         self._centre = np.zeros(2)  # [m] between the feet
 
