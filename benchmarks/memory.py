@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -39,6 +38,12 @@ def resident() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / MEGABYTE
 
 
+def _peak() -> float:
+    """Most resident memory of this program so far [MB]; `ru_maxrss` would count its parent's from before its start."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    return int(status.partition("VmHWM:")[2].split()[0]) * 1024 / MEGABYTE
+
+
 def run(seconds: float, recording: Path | None) -> dict[str, Any]:
     """One run in this process."""
     samples: list[tuple[float, float]] = []
@@ -48,7 +53,7 @@ def run(seconds: float, recording: Path | None) -> dict[str, Any]:
     )
     return {
         "samples": samples,
-        "peak": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / MEGABYTE,  # Linux counts in KiB
+        "peak": _peak(),
         "columns": _column_bytes(result.recorder) / MEGABYTE / seconds,
         "file": recording.stat().st_size / MEGABYTE / seconds if recording else 0.0,
     }

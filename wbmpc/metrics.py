@@ -26,8 +26,10 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
         "com_height_max": float(recorder.com[:, 2].max()),
         "com_speed_max": float(np.linalg.norm(recorder.com_velocity, axis=1).max()),
         "torso_up_min": float(recorder.torso_up.min()),
-        "torque_peak_fraction": float((np.abs(recorder.torque) / facts.stall_torque).max()),
-        "speed_peak_fraction": float((np.abs(recorder.qvel[:, 6 : 6 + joints]) / facts.no_load_speed).max()),
+        "torque_peak_fraction": float((np.abs(recorder.torque).max(axis=0) / facts.stall_torque).max()),
+        "speed_peak_fraction": float(
+            (np.abs(recorder.qvel[:, 6 : 6 + joints]).max(axis=0) / facts.no_load_speed).max()
+        ),
         "penetration_max": float(max(depth.max(initial=0.0), 0.0)),
         "hand_force_max": float(palm_push.max()),
         "hand_contacts": float(len(hands)),

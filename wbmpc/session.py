@@ -17,6 +17,7 @@ from wbmpc.checks.context import CheckContext
 from wbmpc.checks.fall import FallWatch
 from wbmpc.checks.registry import evaluate_checks
 from wbmpc.facts import facts_of
+from wbmpc.jit import trim
 from wbmpc.loop import run_lockstep
 from wbmpc.metrics import metrics_of
 from wbmpc.provenance import document_of
@@ -92,6 +93,7 @@ def run_scenario(
                 on_progress=on_progress,
                 ended=fallen,
             )
+        trim()  # what the loop has freed, before the checks ask for more
         verdict = verdict_of(recorder, scenario, name=name, model=model, robot=robot)
         for sink in (file, view):
             if sink is not None:

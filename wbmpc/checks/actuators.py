@@ -27,7 +27,7 @@ class TorqueLimitCheck:
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
         # At the no-load speed the limit is zero: a floor of a millionth of the stall torque keeps 0/0 at zero.
         limit = np.maximum(context.recorder.torque_limit, 1e-6 * context.facts.stall_torque)
-        ratio = np.abs(context.recorder.torque) / limit  # (n, nj)
+        ratio = np.divide(np.abs(context.recorder.torque), limit, out=limit)  # (n, nj)
         return _worst_joint(name, ratio, context, threshold=self.config.max, what="largest share of the limit")
 
 
@@ -39,7 +39,8 @@ class SpeedLimitCheck:
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
         joints = context.facts.no_load_speed.size  # after them come the loose objects of the world
-        ratio = np.abs(context.recorder.qvel[:, 6 : 6 + joints]) / context.facts.no_load_speed  # (n, nj)
+        ratio = np.abs(context.recorder.qvel[:, 6 : 6 + joints])  # (n, nj)
+        ratio /= context.facts.no_load_speed
         return _worst_joint(name, ratio, context, threshold=self.config.max, what="largest share of no-load speed")
 
 
@@ -50,5 +51,6 @@ class TorquePeakCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        ratio = np.abs(context.recorder.torque) / context.facts.stall_torque  # (n, nj)
+        ratio = np.abs(context.recorder.torque)  # (n, nj)
+        ratio /= context.facts.stall_torque
         return _worst_joint(name, ratio, context, threshold=self.config.max, what="largest share of stall torque")

@@ -55,12 +55,13 @@ def _chosen_palm(context: CheckContext, release_time: float) -> NDArray[np.bool_
     tick, palm = context.recorder.contact_tick, facts.geom_palm[robot_geom]
     grace = context.ticks(release_time)
     declared = np.zeros(tick.size, dtype=bool)
-    for side in range(len(SIDES)):
-        chosen = np.array([patches[side] for patches in context.patch_of_tick])  # (n,) names
-        for patch in set(chosen.tolist()) - {""}:
-            on_object = outside & (palm == side) & np.isin(other_geom, list(facts.patch_geoms[patch]))
-            since = _ticks_since(chosen == patch, ticks)
-            declared |= on_object & (since[tick] <= grace)
+    names, code = context.patch_codes
+    for index, patch in enumerate(names):
+        on_object = outside & np.isin(other_geom, list(facts.patch_geoms[patch]))
+        for side in range(len(SIDES)):
+            chosen = code[:, side] == index
+            if chosen.any():
+                declared |= on_object & (palm == side) & (_ticks_since(chosen, ticks) <= grace)[tick]
     return declared
 
 

@@ -128,17 +128,20 @@ class CheckContext:
     def world_force(self) -> Vector:
         """(n, 3) [N] force of the whole world on the robot, from the plant's contacts."""
         _, _, outside = self.contact_sides
-        total = np.zeros((self.recorder.ticks, 3))
-        np.add.at(total, self.recorder.contact_tick[outside], self.recorder.contacts.force[outside])
-        return total
+        return self._sums(self.recorder.contact_tick[outside], outside, self.recorder.ticks)
 
     def _force_on(self, side_of_geom: NDArray[np.int64]) -> Vector:
         robot_geom, _, outside = self.contact_sides
         side = side_of_geom[robot_geom]
         rows = outside & (side >= 0)
-        total = np.zeros((self.recorder.ticks, 2, 3))
-        np.add.at(total, (self.recorder.contact_tick[rows], side[rows]), self.recorder.contacts.force[rows])
-        return total
+        place = 2 * self.recorder.contact_tick[rows] + side[rows]
+        return self._sums(place, rows, 2 * self.recorder.ticks).reshape(-1, 2, 3)
+
+    def _sums(self, place: NDArray[np.int64], rows: NDArray[np.bool_], count: int) -> Vector:
+        """(count, 3) [N] forces of the chosen `rows` (c,) of the contacts, added up at each one's `place`."""
+        force = self.recorder.contacts.force
+        axes = [np.bincount(place, weights=force[rows, axis], minlength=count) for axis in range(3)]
+        return np.stack(axes, axis=1)
 
     @cached_property
     def plan_of_tick(self) -> NDArray[np.int64]:
@@ -147,24 +150,30 @@ class CheckContext:
         return np.searchsorted(times, self.time + 1e-9, side="right") - 1
 
     @cached_property
-    def patch_of_tick(self) -> list[tuple[str, str]]:
+    def patch_of_tick(self) -> list[tuple[str, ...]]:
         """(n,) patch that each hand (left, right) is chosen for, approaches or holds; "" when none."""
-        per_plan = [
+        per_plan = self._patch_of_plan
+        return [per_plan[index] for index in self.plan_of_tick]
+
+    @cached_property
+    def _patch_of_plan(self) -> list[tuple[str, ...]]:
+        """The same for each plan, and at index -1 for the time before the first."""
+        per_plan: list[tuple[str, ...]] = [
             tuple(
                 patch if ContactPhase.CHOSEN <= phase <= ContactPhase.UNLOADED else ""
                 for patch, phase in zip(plan.contact_patch, plan.contact_phase, strict=True)
             )
             for plan in self.recorder.plans
         ]
-        per_plan.append(("", ""))  # index -1: before the first plan
-        return [per_plan[index] for index in self.plan_of_tick]
+        return [*per_plan, ("", "")]
 
     @cached_property
     def patch_codes(self) -> tuple[tuple[str, ...], NDArray[np.int64]]:
         """Names of all patches ever chosen, and (n, 2) the index among them of `patch_of_tick`, -1 when none."""
-        pairs = np.array(self.patch_of_tick).reshape(-1, 2)
-        names, code = np.unique(np.append(pairs, ""), return_inverse=True)  # sorted: "" comes first
-        return tuple(str(name) for name in names[1:]), code[:-1].reshape(-1, 2) - 1
+        per_plan, which = self._patch_of_plan, self.plan_of_tick
+        names = sorted({patch for index in np.unique(which) for patch in per_plan[index]} - {""})
+        codes = {name: code for code, name in enumerate(names)}
+        return tuple(names), np.array([[codes.get(patch, -1) for patch in pair] for pair in per_plan])[which]
 
     @cached_property
     def palm_push(self) -> Vector:
