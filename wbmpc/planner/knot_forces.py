@@ -40,14 +40,14 @@ class KnotForces:
         self._weight, self._prices = mass * GRAVITY, pack_prices(settings)
         self._softness = 1.0 / (POLYGON_PRICE * settings.shift_slack_cost)
         self._need, self._grips = np.zeros((steps, NEED)), np.zeros((contacts, GRIP))
-        self._polygons: tuple[SupportPolygon, ...] = ()  # packed last; feet that stand have the same at every plan
+        self._polygons: tuple[SupportPolygon, ...] | None = None  # packed last
         self._caps, self._forces = np.zeros((contacts, steps)), np.zeros((contacts, steps, 3))
         self._run()
 
     def solve(self, need: Need, patches: Sequence[PatchPose | None], caps: Vector) -> tuple[Vector | None, QpSolution]:
         """See `ContactForce.solve`; `iterations` counts the knots at which there was something to solve."""
         start = perf_counter()
-        if need.polygons is self._polygons:
+        if need.polygons is self._polygons:  # of feet that stand, from plan to plan
             pack_shift(need, self._need)
         else:
             pack_need(need, self._need)
