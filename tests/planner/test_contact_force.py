@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from contact_case import KNOTS, MASS, POLYGON, SETTINGS, TABLE, lean, patch, pressure
@@ -147,3 +149,20 @@ def test_knot_by_knot_is_the_same_as_one_qp(seed: int) -> None:
     assert ours[0] is not None
     assert_allclose(ours[0], plain[0], atol=1e-4)  # [N]
     assert_allclose(ours[1].x, plain[1].x, atol=1e-4)
+
+
+@BOTH
+def test_no_plan_remembers_the_one_before(backend: str) -> None:
+    """The need changes with the same polygons, then the polygons do: each time as if asked first."""
+    first = lean(0.02, knots=N)
+    questions = [first, replace(lean(0.03, knots=N), polygons=first.polygons), first.inset(0.03), first]
+    patches, caps = [patch(np.array([0.15, 0.0, 0.2]))], np.full((1, N), 20.0)
+    stage = contact_force(backend, shift_slack_cost=1.0)
+    answers = [stage.solve(need, patches, caps)[0] for need in questions]
+    for need, answer in zip(questions, answers, strict=True):
+        alone, _ = contact_force(backend, shift_slack_cost=1.0).solve(need, patches, caps)
+        assert alone is not None
+        assert answer is not None
+        assert_allclose(answer, alone, atol=1e-6)
+    assert np.abs(answers[0] - answers[1]).max() > 0.01
+    assert np.abs(answers[0] - answers[2]).max() > 0.01

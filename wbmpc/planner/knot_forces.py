@@ -17,12 +17,14 @@ from wbmpc.planner.knot_qp import (
     pack_need,
     pack_patch,
     pack_prices,
+    pack_shift,
     solve_knot,
     to_world,
     unpack_grips,
     unpack_need,
 )
 from wbmpc.planner.settings import ContactSettings
+from wbmpc.planner.support import SupportPolygon
 from wbmpc.qp import QpSolution
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SIDES, SolveStatus, Vector
@@ -38,13 +40,18 @@ class KnotForces:
         self._weight, self._prices = mass * GRAVITY, pack_prices(settings)
         self._softness = 1.0 / (POLYGON_PRICE * settings.shift_slack_cost)
         self._need, self._grips = np.zeros((steps, NEED)), np.zeros((contacts, GRIP))
+        self._polygons: tuple[SupportPolygon, ...] | None = None  # packed last
         self._caps, self._forces = np.zeros((contacts, steps)), np.zeros((contacts, steps, 3))
         self._run()
 
     def solve(self, need: Need, patches: Sequence[PatchPose | None], caps: Vector) -> tuple[Vector | None, QpSolution]:
         """See `ContactForce.solve`; `iterations` counts the knots at which there was something to solve."""
         start = perf_counter()
-        pack_need(need, self._need)
+        if need.polygons is self._polygons:  # of feet that stand, from plan to plan
+            pack_shift(need, self._need)
+        else:
+            pack_need(need, self._need)
+            self._polygons = need.polygons
         self._caps[:] = caps
         for i, patch in enumerate(patches):
             if patch is None:

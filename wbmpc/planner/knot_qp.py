@@ -59,17 +59,19 @@ class KnotRoom(NamedTuple):
 
 def pack_need(need: Need, packed: Vector) -> None:
     """Write `need` into `packed` (n, NEED), the form in which it is handed to a kernel."""
+    pack_shift(need, packed)
+    for row, polygon in zip(packed, need.polygons, strict=True):
+        row[7] = polygon.plane_height
+        row[8 : 8 + MAX_EDGES] = polygon.offsets
+        row[8 + MAX_EDGES :] = polygon.normals.ravel()
+
+
+def pack_shift(need: Need, packed: Vector) -> None:
+    """Write of `need` what changes from plan to plan even while the feet stand: all but the polygons."""
     packed[:, 0:2] = need.delta_z
     packed[:, 2:4] = need.zmp
     packed[:, 4] = need.weight
     packed[:, 5:7] = need.phantom
-    before = None
-    for k, polygon in enumerate(need.polygons):
-        if polygon is not before:  # standing feet have the same one at many knots: it is written to the end
-            packed[k:, 7] = polygon.plane_height
-            packed[k:, 8 : 8 + MAX_EDGES] = polygon.offsets
-            packed[k:, 8 + MAX_EDGES :] = polygon.normals.ravel()
-            before = polygon
 
 
 def pack_patch(patch: PatchPose, packed: Vector) -> None:

@@ -166,18 +166,14 @@ class Planner:
             self._footstep_shift = motion.footstep_shift
 
         course = com_course(self._com.value, motion, height)
-        if motion is not None:  # copies: a report outlives its motion
-            com, acceleration, zmp = course[0][1:, :, 0].copy(), course[0][1:, :, 2].copy(), motion.zmp.copy()
-        else:
-            com = acceleration = np.full((preview.steps, 3), np.nan)
-            zmp = com[:, :2]
+        planned = course[0][1:] if motion is not None else np.full((preview.steps, 3, 3), np.nan)
         report = PlanReport(
             time=state.time,
             mass=mass,
-            com=com,
-            com_acceleration=acceleration,
+            com=planned[:, :, 0].copy(),
+            com_acceleration=planned[:, :, 2].copy(),
             com_height_band=band,
-            zmp=zmp,
+            zmp=motion.zmp.copy() if motion is not None else planned[:, :2, 0],  # a report outlives its motion
             support_polygon=gated_support.polygons[0].vertices,
             delta_z=judgement.delta_z,
             hand_reference=gated,
