@@ -12,8 +12,9 @@ from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.gait import Gait
 from wbmpc.planner.horizontal_motion import Motion, ZmpModel
-from wbmpc.planner.references import References
+from wbmpc.planner.references import Paths, References
 from wbmpc.planner.settings import PlannerSettings
+from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
 from wbmpc.planner.zmp_model import need_at_rest, need_of
@@ -37,11 +38,13 @@ class Judge:
     ) -> None:
         self._settings, self._margin = settings, settings.whole_body.zmp_margin
         self._gait, self._references, self._contacts, self._tasks = gait, references, contacts, tasks
+        self._goal: tuple[Vector, SupportPolygon, float, Need] | None = None  # `_goal_need` of the last plan, and whose
 
     def judge(
         self,
         time: float,
         times: Vector,
+        paths: Paths,
         ask: Callable[[Vector], Motion | None],
         *,
         height: HeightPlan,
@@ -56,20 +59,19 @@ class Judge:
 
         Args:
             time: now [s]; `times` (N,): the knots [s from now].
+            paths: what the tasks ask for at full pace.
             ask: stage 2 with ΔZ free, given where the CoM may be (2, N, 2) [m].
             model: the ZMP without contact, what the hands carry included; `carried` (2, N, 3) [N]: its forces.
             support: at full pace.
             palms: measured (2, 3) [m].
             mass: [kg].
         """
-        nothing = Judgement(np.zeros((len(times), 2)))
         if not self._settings.contact_stage:
-            return nothing
+            return Judgement(np.zeros((len(times), 2)))
         contacts, references, gait = self._contacts, self._references, self._gait
-        palm_paths, sigma = references.palms(time, None, pace=1.0)
-        wish = ask(references.com_band(contacts, palm_paths, sigma, gait.shares(times, 1.0)))
+        wish = ask(references.com_band(contacts, paths, gait.shares(times, 1.0)))
         if wish is None:
-            return nothing
+            return Judgement(np.zeros((len(times), 2)))
         need = need_of(
             *(wish, height, model),
             carried=carried,
@@ -92,4 +94,9 @@ class Judge:
     def _goal_need(self, mass: float) -> Need | None:
         """The need where the current task ends, on the feet that will carry it; None without such a task."""
         com = self._references.goal_com
-        return None if com is None else need_at_rest(com, polygon=self._gait.goal_polygon(self._margin), mass=mass)
+        if com is None:
+            return None
+        polygon = self._gait.goal_polygon(self._margin)
+        if self._goal is None or self._goal[0] is not com or self._goal[1] is not polygon or self._goal[2] != mass:
+            self._goal = com, polygon, mass, need_at_rest(com, polygon=polygon, mass=mass)
+        return self._goal[3]
