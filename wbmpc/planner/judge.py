@@ -14,7 +14,6 @@ from wbmpc.planner.gait import Gait
 from wbmpc.planner.horizontal_motion import Motion, ZmpModel
 from wbmpc.planner.references import Paths, References
 from wbmpc.planner.settings import PlannerSettings
-from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
 from wbmpc.planner.zmp_model import need_at_rest, need_of
@@ -38,7 +37,6 @@ class Judge:
     ) -> None:
         self._settings, self._margin = settings, settings.whole_body.zmp_margin
         self._gait, self._references, self._contacts, self._tasks = gait, references, contacts, tasks
-        self._goal: tuple[Vector, SupportPolygon, float, Need] | None = None  # `_goal_need` of the last plan, and whose
 
     def judge(
         self,
@@ -94,9 +92,4 @@ class Judge:
     def _goal_need(self, mass: float) -> Need | None:
         """The need where the current task ends, on the feet that will carry it; None without such a task."""
         com = self._references.goal_com
-        if com is None:
-            return None
-        polygon = self._gait.goal_polygon(self._margin)
-        if self._goal is None or self._goal[0] is not com or self._goal[1] is not polygon or self._goal[2] != mass:
-            self._goal = com, polygon, mass, need_at_rest(com, polygon=polygon, mass=mass)
-        return self._goal[3]
+        return None if com is None else need_at_rest(com, polygon=self._gait.goal_polygon(self._margin), mass=mass)
