@@ -27,15 +27,12 @@ class Bench:
         self.reach, self.time, self.error = Reach(task, side=0, palm=START), 0.0, np.zeros(3)
         self.positions: list[Vector] = []
         self.velocities: list[Vector] = []
-        self.accelerations: list[Vector] = []
 
     def step(self, *, gate_open: bool = True) -> None:
         palm = self.reach.reference()[0] + self.error
         self.reach.advance(self.time, DT, gate_open=gate_open, palm=palm)
         self.time += DT
-        for values, value in zip(
-            (self.positions, self.velocities, self.accelerations), self.reach.reference(), strict=True
-        ):
+        for values, value in zip((self.positions, self.velocities), self.reach.reference(), strict=True):
             values.append(value)
 
     def preview(self, seconds: Vector, *, rate: float) -> Vector:
@@ -64,18 +61,16 @@ def test_a_reach_takes_its_times() -> None:
 
 @settings(max_examples=30)
 @given(gates=st.lists(st.tuples(st.booleans(), st.integers(1, 60)), max_size=5))
-def test_velocity_and_acceleration_scale_with_the_clock(gates: list[tuple[bool, int]]) -> None:
-    """However the gate opens and closes, the references are each other's derivatives (finite differences)."""
+def test_velocity_scales_with_the_clock(gates: list[tuple[bool, int]]) -> None:
+    """However the gate opens and closes, the velocity is that of the positions, and does not jump."""
     bench = Bench()
     plan = [gate_open for gate_open, count in gates for _ in range(count)]
     while bench.reach.progress.phase in (TaskPhase.WAIT, TaskPhase.GO):
         bench.step(gate_open=plan.pop() if plan else True)
-    p, v, a = (np.array(x[:-1]) for x in (bench.positions, bench.velocities, bench.accelerations))
+    p, v = (np.array(x[:-1]) for x in (bench.positions, bench.velocities))
     assert_allclose((p[1:] - p[:-1]) / DT, 0.5 * (v[1:] + v[:-1]), atol=0.02)
     assert np.abs(v).max() > 0.1
-    # the clock's own acceleration jumps when the gate changes; elsewhere the difference is second order
-    error = np.abs((v[1:] - v[:-1]) / DT - 0.5 * (a[1:] + a[:-1])).max(axis=1)
-    assert (error > 0.1).sum() <= 4 * (len(gates) + 1)
+    assert np.abs(np.diff(v, axis=0)).max() < 6.0 * DT
 
 
 def test_a_closed_gate_stops_the_reach_smoothly_and_an_open_one_resumes_it() -> None:

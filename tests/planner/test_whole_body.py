@@ -12,7 +12,6 @@ from numpy.testing import assert_allclose
 from reference_qp import ReferenceQp
 from robots import surena
 from whole_body_case import (
-    PREVIEW,
     ROBOT,
     SETTINGS,
     TAU,
@@ -28,12 +27,14 @@ from whole_body_case import (
     velocity_tasks,
 )
 
-from wbmpc.planner.bands import horizontal_band
-from wbmpc.planner.horizontal_motion import LARGEST_SHIFT, ZmpModel
+from wbmpc.planner.bands import NO_FOOT, horizontal_band
+from wbmpc.planner.com_height import HeightPlan
+from wbmpc.planner.horizontal_motion import LARGEST_SHIFT
 from wbmpc.planner.joint_velocities import FOOT_ROWS
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.planner.whole_body import HorizontalPlan
+from wbmpc.planner.zmp_model import loaded_model
 from wbmpc.signals import GRAVITY, SolveStatus, Vector
 
 POLYGON = standing().polygons[0]
@@ -298,7 +299,7 @@ def leaning(distance: float) -> Problem:
     """A hand reference `distance` beyond the toes, d = 0.15 m, in the second half of the horizon."""
     reach = np.full((2, N, 2), np.nan)
     reach[0, 8:] = [TOES + distance, 0.0]
-    return still(com_band=horizontal_band(reach, np.full((2, 2), 0.15)))
+    return still(com_band=horizontal_band(reach, np.full((2, 2), 0.15), NO_FOOT, NO_FOOT))
 
 
 def test_a_hand_within_reach_needs_no_shift() -> None:
@@ -330,16 +331,14 @@ def test_a_known_force_lets_the_com_past_the_toes() -> None:
     m, lift, x, z = ROBOT.mass, 8.0, 0.27, 0.20
     point, force = np.tile([x, 0.0, z], (N, 1)), np.tile([0.0, 0.0, lift], (N, 1))
     zero = np.zeros(N)
-    a, b = PREVIEW.zmp_gains(height=np.full(N, 0.264), vertical_acceleration=zero, vertical_force=force[:, 2], mass=m)
-    offset = PREVIEW.zmp_offset(
-        point=point, force=force, vertical_acceleration=zero, vertical_force=force[:, 2], mass=m, plane_height=0.0
-    )
+    height = HeightPlan(jerk=zero, height=np.full(N, 0.264), velocity=zero, acceleration=zero)
+    model = loaded_model(height, forces=force[None], points=point[None], plane=0.0, mass=m)
     # moments about the foremost place of the pressure, at rest: how far out the CoM may be
     front = POLYGON.offsets[np.argmax(POLYGON.normals[:, 0])]
     outmost = front + lift * (x - front) / (m * GRAVITY)
     assert outmost > TOES + 0.03
     state = np.array([[outmost - 0.003, 0.0, 0.0], [POLYGON.centre[1], 0.0, 0.0]])
-    braced = solve(still(state=state, zmp=ZmpModel(a, b, offset)))
+    braced = solve(still(state=state, zmp=model))
     assert max(POLYGON.excess(z) for z in braced.zmp) < 1e-4
     assert braced.com[:, 0].max() < outmost + 1e-4
     unaided = solve(still(state=state))

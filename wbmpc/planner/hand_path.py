@@ -45,17 +45,14 @@ class HandPath:
         p, dp, ddp = _at(self.start, self.end, self.away, sigma)
         return p, dp, ddp
 
-    def shared(self, sigma: float, motion: Vector) -> tuple[Vector, Vector]:
-        """What the palm at σ makes of a motion (3,) of the path's end, and the derivative of that with respect to σ."""
+    def shared(self, sigma: float, motion: Vector) -> Vector:
+        """What the palm at σ makes of a motion (3,) of the path's end."""
         outward = float(motion @ self.away) * self.away
         first, second = (LEAD, LAG) if float((self.end - self.start) @ self.away) >= 0.0 else (LAG, LEAD)
-        value, slope = np.zeros(3), np.zeros(3)
+        value = np.zeros(3)
         for part, (begin, finish) in ((outward, first), (motion - outward, second)):
-            scale = 1.0 / (finish - begin)
-            s, ds, _ = minimum_jerk((sigma - begin) * scale)
-            value += s * part
-            slope += ds * scale * part
-        return value, slope
+            value += minimum_jerk((sigma - begin) * (1.0 / (finish - begin)))[0] * part
+        return value
 
     def positions(self, sigmas: Vector) -> Vector:
         """Positions (n, 3) [m] at `sigmas` (n,)."""

@@ -9,7 +9,7 @@ import numpy as np
 from wbmpc.frame_terms import chains_of
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.footstep import SoleReferences
-from wbmpc.planner.joint_reference_kernel import Pulls, Wanted, linearise
+from wbmpc.planner.joint_reference_kernel import COM, FEET, HANDS, TORSO, Pulls, Wanted, linearise
 from wbmpc.planner.joint_velocities import VelocityTasks
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.robot import Robot
@@ -65,25 +65,25 @@ class JointReference:
 
     def tasks(
         self,
+        posture: Vector,
+        torso_up: Vector,
+        torso_heading: float,
         *,
         com: Vector,
         vertical_velocity: float,
         soles: SoleReferences,
         hands: list[tuple[Vector, Vector, HandMode]],
-        posture: Vector,
-        torso_up: Vector,
-        torso_heading: float,
     ) -> VelocityTasks:
         """Stage 2's velocity tasks at the reference.
 
         Args:
+            posture: (nj,) joint angles to be drawn to [rad].
+            torso_up: (3,) where the torso's own vertical should point, in world.
+            torso_heading: its yaw [rad].
             com: planned CoM (3,) now [m].
             vertical_velocity: stage 1's ċ_z [m/s].
             soles: where the feet are or should be in their swing.
             hands: position [m], velocity [m/s] (3,) and mode of each hand.
-            posture: (nj,) joint angles to be drawn to [rad].
-            torso_up: (3,) where the torso's own vertical should point, in world.
-            torso_heading: its yaw [rad].
         """
         palms, velocities, active = self._palms, self._palm_velocities, np.zeros(2)
         for side, (position, velocity, mode) in enumerate(hands):
@@ -103,25 +103,23 @@ class JointReference:
             torso_up=torso_up,
             torso_heading=torso_heading,
         )
-        com_jacobian, com_correction, feet, foot_velocity, self._palm_jacobian, hand_velocity, *rest = linearise(
-            self._views, *self._chains, self._pulls, self.q, self._limits, wanted
-        )
-        self._torso_jacobian, torso_velocity, posture_velocity, lower, upper = rest
+        J, velocity, joints = linearise(self._views, *self._chains, self._pulls, self.q, self._limits, wanted)
+        self._palm_jacobian, self._torso_jacobian = J[HANDS], J[TORSO]
         return VelocityTasks(
-            com_jacobian=com_jacobian,
-            com_correction=com_correction,
+            com_jacobian=J[COM],
+            com_correction=velocity[COM],
             com_vertical_velocity=vertical_velocity,
-            foot_jacobian=feet,
-            foot_velocity=foot_velocity,
+            foot_jacobian=J[FEET],
+            foot_velocity=velocity[FEET],
             hand_jacobian=self._palm_jacobian,
-            hand_velocity=hand_velocity,
+            hand_velocity=velocity[HANDS],
             hand_active=active,
             torso_jacobian=self._torso_jacobian,
-            torso_velocity=torso_velocity,
-            posture_velocity=posture_velocity,
+            torso_velocity=velocity[TORSO],
+            posture_velocity=joints[0],
             posture_weight=self._weights[bool(active[0]), bool(active[1])],
-            lower=lower,
-            upper=upper,
+            lower=joints[1],
+            upper=joints[2],
         )
 
     def _weight(self, active: tuple[bool, bool]) -> Vector:

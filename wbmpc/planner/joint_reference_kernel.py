@@ -15,6 +15,7 @@ from wbmpc.signals import Vector
 LIMIT_TIME = 0.1  # [s] within which a joint may come to its end
 BASE_SPEED = 5.0  # [m/s, rad/s] bound on the base's velocity
 FASTEST_PULL = 0.4  # [m/s] of a palm that is off its reference
+COM, HANDS, TORSO, FEET = slice(0, 3), slice(3, 9), slice(9, 12), slice(12, 24)  # rows of the tasks' Jacobian
 
 
 class Pulls(NamedTuple):
@@ -50,9 +51,9 @@ def linearise(
     q: Vector,
     limits: Vector,
     wanted: Wanted,
-) -> tuple[Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector, Vector]:
-    """Fields of `VelocityTasks`: Jacobian and velocity of CoM (3), feet (12), hands (6) and torso (3); then posture's
-    velocity (nv,) and the bounds (nv,) on q̇.
+) -> tuple[Vector, Vector, Vector]:
+    """Jacobian (24, nv) and velocity (24,) of CoM, hands, torso and feet, in these rows; then (3, nv) the
+    posture's velocity and the bounds on q̇.
 
     Args:
         pin: Pinocchio's views at q: J (6, nv), J_com (3, nv), CoM, positions of soles and palms, rotations (3, 3) of
@@ -63,11 +64,17 @@ def linearise(
     J, com_jacobian, com, positions, rotations = pin
     nj = len(wanted.posture)
     nv = nj + 6
-    com_J, com_velocity = com_jacobian.copy(), np.empty(3)
-    foot_J, foot_velocity = np.zeros((12, nv)), np.empty(12)
-    hand_J, hand_velocity = np.zeros((6, nv)), np.zeros(6)
-    torso_J, torso_velocity = np.zeros((3, nv)), np.empty(3)
-    posture_velocity, lower, upper = np.zeros(nv), np.empty(nv), np.empty(nv)
+    jacobian, velocity = np.zeros((24, nv)), np.zeros(24)
+    com_J, hand_J, torso_J, foot_J = jacobian[:3], jacobian[3:9], jacobian[9:12], jacobian[12:]
+    com_velocity, hand_velocity, torso_velocity, foot_velocity = (
+        velocity[:3],
+        velocity[3:9],
+        velocity[9:12],
+        velocity[12:],
+    )
+    joints = np.zeros((3, nv))
+    posture_velocity, lower, upper = joints[0], joints[1], joints[2]
+    com_J[:] = com_jacobian
     turn = np.empty(3)
     for i in range(3):
         com_velocity[i] = pulls.tracking * (wanted.com[i] - com[i])
@@ -105,7 +112,4 @@ def linearise(
         posture_velocity[6 + i] = pulls.posture * (wanted.posture[i] - angle)
         lower[6 + i] = min(max((limits[0, i] - angle) / LIMIT_TIME, -speed), 0.0)
         upper[6 + i] = min(max((limits[1, i] - angle) / LIMIT_TIME, 0.0), speed)
-    return (
-        *(com_J, com_velocity, foot_J, foot_velocity, hand_J, hand_velocity),
-        *(torso_J, torso_velocity, posture_velocity, lower, upper),
-    )
+    return jacobian, velocity, joints

@@ -12,7 +12,7 @@ from wbmpc.planner.contact_force import Need
 from wbmpc.planner.contacts import NOT_RUN, Contacts
 from wbmpc.planner.gait import Gait
 from wbmpc.planner.horizontal_motion import Motion, ZmpModel
-from wbmpc.planner.references import References
+from wbmpc.planner.references import Paths, References
 from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
@@ -42,6 +42,7 @@ class Judge:
         self,
         time: float,
         times: Vector,
+        paths: Paths,
         ask: Callable[[Vector], Motion | None],
         *,
         height: HeightPlan,
@@ -56,20 +57,19 @@ class Judge:
 
         Args:
             time: now [s]; `times` (N,): the knots [s from now].
+            paths: what the tasks ask for at full pace.
             ask: stage 2 with ΔZ free, given where the CoM may be (2, N, 2) [m].
             model: the ZMP without contact, what the hands carry included; `carried` (2, N, 3) [N]: its forces.
             support: at full pace.
             palms: measured (2, 3) [m].
             mass: [kg].
         """
-        nothing = Judgement(np.zeros((len(times), 2)))
         if not self._settings.contact_stage:
-            return nothing
+            return Judgement(np.zeros((len(times), 2)))
         contacts, references, gait = self._contacts, self._references, self._gait
-        palm_paths, sigma = references.palms(time, None, pace=1.0)
-        wish = ask(references.com_band(contacts, palm_paths, sigma, gait.shares(times, 1.0)))
+        wish = ask(references.com_band(contacts, paths, gait.shares(times, 1.0)))
         if wish is None:
-            return nothing
+            return Judgement(np.zeros((len(times), 2)))
         need = need_of(
             *(wish, height, model),
             carried=carried,

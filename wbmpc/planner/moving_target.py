@@ -31,23 +31,19 @@ class MovingTarget:
         """`dt` [s] later; it has arrived when less than 10 µm and 0.1 mm/s are left."""
         if not self.moving:
             return
-        x, v, a = self._after(np.array([dt]))
-        self.position, self.velocity, self.acceleration = x[0], v[0], a[0]
+        x, v = self._after(np.array([dt]))
+        self.position, self.velocity = x[0], v[0]
         if np.linalg.norm(self.goal - self.position) < 1e-5 and np.linalg.norm(self.velocity) < 1e-4:
-            self.position, self.velocity, self.acceleration = self.goal, np.zeros(3), np.zeros(3)
+            self.position, self.velocity = self.goal, np.zeros(3)
 
     def preview(self, times: Vector) -> Vector:
         """Positions (n, 3) [m] at `times` (n,) seconds from now, if nobody moves it again."""
         return self._after(times)[0] if self.moving else np.tile(self.goal, (len(times), 1))
 
-    def _after(self, times: Vector) -> tuple[Vector, Vector, Vector]:
-        """Position, velocity and acceleration, (n, 3) each."""
+    def _after(self, times: Vector) -> tuple[Vector, Vector]:
+        """Position and velocity, (n, 3) each."""
         way, w, t = self.goal - self.position, FREQUENCY, times[:, None]
         lead = way * min(1.0, LEAD / max(float(np.linalg.norm(way)), 1e-12))
         a, b = -lead, self.velocity - w * lead
         decay = np.exp(-w * t)
-        return (
-            self.position + lead + (a + b * t) * decay,
-            (b - w * (a + b * t)) * decay,
-            (w * w * (a + b * t) - 2.0 * w * b) * decay,
-        )
+        return self.position + lead + (a + b * t) * decay, (b - w * (a + b * t)) * decay

@@ -105,26 +105,23 @@ class Planner:
         plane = gated_support.polygons[0].plane_height
         mass = state.mass_scale * self._robot.mass
 
-        gated, sigma = references.palms(state.time, contacts)
+        gated, full = references.paths(state.time, contacts)
         foot = self._gait.shares(preview.times, self._gate)
         begin = perf_counter()
-        band = height_band(settings.height, gated, references.height_distance(settings.height.reach), plane)
-        wanted = references.wanted_height(state.time, contacts, np.maximum(sigma, foot)) - self._gait.crouch
+        band = height_band(settings.height, gated.palms, references.height_distance(settings.height.reach), plane)
+        wanted = references.wanted_height(state.time, contacts, np.maximum(gated.sigma, foot)) - self._gait.crouch
         height, solution = self._height_stage.plan(self._com.value[2], wanted=wanted, band=band, plane=plane)
         stage1 = stage_report(solution, begin)
 
         begin = perf_counter()
         hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
-        posture, torso_up, torso_heading = references.attitude(contacts, float(soles.yaws.mean()))
         tasks = self._joints.tasks(
+            *references.attitude(contacts, float(soles.yaws.mean())),
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
             hands=hands,
-            posture=posture,
-            torso_up=torso_up,
-            torso_heading=torso_heading,
         )
 
         def stage_2(
@@ -143,9 +140,10 @@ class Planner:
         carried = references.carried(preview.times)
         model = free_model(height, plane=plane, mass=mass, exact=settings.formulation == "exact")
         if carried.any():
-            model = loaded_model(height, forces=carried, points=gated, plane=plane, mass=mass)
+            model = loaded_model(height, forces=carried, points=gated.palms, plane=plane, mass=mass)
         judgement = self._judge.judge(
             *(state.time, preview.times),
+            full,
             lambda com_band: stage_2(self._need_stage, self._com.anticipated, model, judged, com_band)[0],
             height=height,
             model=model,
@@ -159,7 +157,7 @@ class Planner:
         if contacts.forces.any():  # hands that brace carry nothing: either force is all there is
             points = held(contacts.points, preview.steps)
             model = loaded_model(height, forces=forces, points=points, plane=plane, mass=mass)
-        com_band = references.com_band(contacts, gated, sigma, foot)
+        com_band = references.com_band(contacts, gated, foot)
         motion, solution = stage_2(self._motion_stage, self._com.value, model, gated_support, com_band)
         stage2 = stage_report(solution, begin)
         if motion is not None:
@@ -176,7 +174,7 @@ class Planner:
             zmp=motion.zmp.copy() if motion is not None else planned[:, :2, 0],  # a report outlives its motion
             support_polygon=gated_support.polygons[0].vertices,
             delta_z=judgement.delta_z,
-            hand_reference=gated,
+            hand_reference=gated.palms,
             contact_force=forces,
             contact_phase=np.array([int(c.phase) for c in contacts.hands]),
             contact_patch=(contacts.name(0), contacts.name(1)),

@@ -36,7 +36,6 @@ class Progress:
         self.rate = 1.0
         self.sigma = 0.0
         self.sigma_rate = 0.0  # [1/s]
-        self.sigma_acceleration = 0.0  # [1/s²]
         self._held, self._waited = 0.0, 0.0
 
     @property
@@ -51,23 +50,23 @@ class Progress:
 
     def advance(self, time: float, dt: float, *, gate_open: bool, met: bool) -> None:
         """One plan later; the gate is closed while an expected contact is missing; `met`: the target is met now."""
-        task, before = self._task, self.rate
+        task = self._task
         lowest = min(self.rate, 0.0)  # below 0 only on a way back that was called off
         self.rate = min(max(self.rate + (dt if gate_open or lowest else -dt) / GATE_TIME, lowest), 1.0)
         if self.phase == TaskPhase.WAIT and time >= task.start - 1e-9:
             self.phase = TaskPhase.GO
         if self.phase == TaskPhase.GO:
-            self._move(self.rate / self._go_time, (self.rate - before) / dt / self._go_time, dt)
+            self._move(self.rate / self._go_time, dt)
             if self.sigma >= 1.0:
                 self.phase = TaskPhase.HOLD
         elif self.phase == TaskPhase.HOLD:
-            self._move(0.0, 0.0, dt)
+            self._move(0.0, dt)
             self._waited += dt
             self._held = self._held + dt if met else 0.0
             if self._held >= task.hold or self._waited >= task.hold + task.patience:
                 self.phase = TaskPhase.BACK
         elif self.phase == TaskPhase.BACK:
-            self._move(-1.0 / task.withdraw, 0.0, dt)
+            self._move(-1.0 / task.withdraw, dt)
             if self.sigma <= 0.0:
                 self.phase = TaskPhase.DONE
 
@@ -80,13 +79,15 @@ class Progress:
 
     def sigmas(self, time: float, times: Vector, *, rate: float) -> Vector:
         """σ (n,) at `times` (n,) seconds from now, the way out going on at `rate`."""
-        if self.phase == TaskPhase.BACK:
-            return np.clip(self.sigma - times / self._task.withdraw, 0.0, 1.0)
         if self.phase == TaskPhase.DONE:
             return np.zeros(len(times))
-        moving = times if self.phase != TaskPhase.WAIT else np.maximum(times - (self._task.start - time), 0.0)
-        return np.clip(self.sigma + max(rate, 0.0) * moving / self._go_time, 0.0, 1.0)
+        if self.phase == TaskPhase.BACK:
+            sigmas = self.sigma - times / self._task.withdraw
+        else:
+            moving = times if self.phase != TaskPhase.WAIT else np.maximum(times - (self._task.start - time), 0.0)
+            sigmas = self.sigma + max(rate, 0.0) * moving / self._go_time
+        return np.minimum(np.maximum(sigmas, 0.0), 1.0)
 
-    def _move(self, rate: float, acceleration: float, dt: float) -> None:
+    def _move(self, rate: float, dt: float) -> None:
         self.sigma = min(max(self.sigma + rate * dt, 0.0), 1.0)
-        self.sigma_rate, self.sigma_acceleration = rate, acceleration
+        self.sigma_rate = rate

@@ -52,19 +52,14 @@ class Reach:
             self._place.advance(dt * max(self.progress.rate, 0.0))
             self._path = replace(self._path, end=self.target)
 
-    def reference(self) -> tuple[Vector, Vector, Vector]:
-        """Palm position, velocity and acceleration (3,) to follow now."""
+    def reference(self) -> tuple[Vector, Vector]:
+        """Palm position and velocity (3,) to follow now."""
         progress, place = self.progress, self._place
-        p, dp, ddp = self._path.at(progress.sigma)
+        p, dp, _ = self._path.at(progress.sigma)
         v = dp * progress.sigma_rate
-        a = ddp * progress.sigma_rate**2 + dp * progress.sigma_acceleration
-        if place.moving:
-            rate = max(progress.rate, 0.0)  # of this reach's clock, which the target's way waits for
-            shared, slope = self._path.shared(progress.sigma, place.velocity * rate)
-            v = v + shared
-            a = a + 2.0 * slope * progress.sigma_rate
-            a = a + self._path.shared(progress.sigma, place.acceleration * rate**2)[0]
-        return p, v, a
+        if place.moving:  # of this reach's clock, which the target's way waits for
+            v = v + self._path.shared(progress.sigma, place.velocity * max(progress.rate, 0.0))
+        return p, v
 
     def preview(self, sigmas: Vector, times: Vector) -> Vector:
         """Palm references (n, 3) [m] at the places `sigmas` (n,) of the way, `times` (n,) seconds from now."""

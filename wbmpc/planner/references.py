@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wbmpc.jit import kernel
@@ -24,6 +26,13 @@ SPENT = 0.02  # [m] palm error of a posture from which a contact does not reach
 COM_COST = 3.0  # [cost / m²] how hard a reach's posture keeps its CoM over the feet
 LEAN_COST = 100.0  # [cost / m²] how hard a lean's posture brings its CoM to the target
 LEAN_BAND = 0.001  # [m] d of the CoM from a lean's way
+
+
+class Paths(NamedTuple):
+    """What the palms are to do over the horizon."""
+
+    palms: Vector  # (2, N, 3) [m] in world, nan for a free hand
+    sigma: Vector  # (N,) progress of the furthest task
 
 
 class References:
@@ -81,43 +90,47 @@ class References:
 
     @property
     def _goal(self) -> Posture:
-        if self._tasks.lifting is not None:
-            return self._lift.high if self._tasks.lifting.raised else self._lift.low
-        return self._lean_goal if self._tasks.leaning is not None else self._reach_goal
+        lift = self._tasks.lifting
+        if lift is not None:
+            return self._lift.high if lift.raised else self._lift.low
+        return self._reach_goal if self._tasks.leaning is None else self._lean_goal
 
     # ------------------------------------------------------------------ over the horizon
 
-    def palms(self, time: float, contacts: Contacts | None, *, pace: float | None = None) -> tuple[Vector, Vector]:
-        """Palm references (2, N, 3) [m], nan for a free hand, and the furthest task's σ (N,).
+    def paths(self, time: float, contacts: Contacts) -> tuple[Paths, Paths]:
+        """At the tasks' own pace with the contacts' palms, and what the tasks alone would ask at full pace."""
+        full = self._paths(time, pace=1.0)
+        held_up = any(task.progress.rate != 1.0 for task in self._tasks.current)
+        palms, sigma = self._paths(time) if held_up else full
+        braced = [c for c in contacts.hands if c.has_goal and np.isnan(palms[c.side, 0, 0])]  # tasks go first
+        if braced:
+            palms = palms.copy()
+            for contact in braced:
+                palms[contact.side] = contact.preview(self._times)
+        return Paths(palms, sigma), full
 
-        Args:
-            contacts: None leaves them out: what the tasks alone ask for.
-            pace: of all tasks' clocks, 0 … 1; None: each at its own gate's.
-        """
+    def _paths(self, time: float, *, pace: float | None = None) -> Paths:
+        """Of the tasks; `pace` of all their clocks, 0 … 1; None: each at its own gate's."""
         times = self._times
-        references = np.full((len(SIDES), len(times), 3), np.nan)
-        sigma = np.zeros(len(times))
-        for contact in contacts.hands if contacts is not None else ():
-            if contact.has_goal:
-                references[contact.side] = contact.preview(times)
+        palms, sigma = np.full((len(SIDES), len(times), 3), np.nan), np.zeros(len(times))
         for task in self._tasks.current:
             sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
             sigma = np.maximum(sigma, sigmas)
             if isinstance(task, Reach):
-                references[task.side] = task.preview(sigmas, times)
-        if self._tasks.lifting is not None:
-            references[:] = self._tasks.lifting.preview(times)
-            sigma = np.maximum(sigma, self._tasks.lifting.sigmas(times))
-        return references, sigma
+                palms[task.side] = task.preview(sigmas, times)
+        lift = self._tasks.lifting
+        if lift is not None:
+            palms[:] = lift.preview(times)
+            sigma = np.maximum(sigma, lift.sigmas(times))
+        return Paths(palms, sigma)
 
-    def com_band(self, contacts: Contacts, palms: Vector, sigma: Vector, foot: Vector) -> Vector:
+    def com_band(self, contacts: Contacts, paths: Paths, foot: Vector) -> Vector:
         """Where the horizontal CoM may be (2, N, 2) [m]: within d of palms and foot, near a lean's way; see `bands`.
 
         Args:
-            palms, sigma: what `palms` answered, (2, N, 3) [m] and (N,).
             foot: shares (N,) of a stride's way; without a stride not looked at.
         """
-        place = distance = NO_FOOT
+        (palms, sigma), place, distance = paths, NO_FOOT, NO_FOOT
         if self._stride is not None:
             place, distance = self._stride.positions(foot)[None], self._foot_distance(contacts, foot)[None]
         band = horizontal_band(palms, self._reach_distance(contacts), place, distance)
@@ -145,9 +158,10 @@ class References:
 
     def _base(self, contacts: Contacts) -> Posture:
         """What the robot does without a task: stand, or brace; from where it goes on: hold what it lifts."""
-        if self._tasks.lifting is not None and self._tasks.lifting.raised:
+        lift, braced = self._tasks.lifting, contacts.posture
+        if lift is not None and lift.raised:
             return self._lift.low
-        return contacts.posture if contacts.posture is not None else self._stand
+        return self._stand if braced is None else braced
 
     def _foot_distance(self, contacts: Contacts, share: Vector) -> Vector:
         """d (N, 2) [m] of a stride's foot at `share` (N,) of its way, from the postures before and after."""
@@ -186,7 +200,7 @@ class References:
     def height_distance(self, usual: float) -> Vector:
         """d (2,) of each hand [m] for the CoM height: `usual`, or what lies between the two in a lift's postures."""
         lift = self._tasks.lifting
-        return np.full(len(SIDES), usual) if lift is None else self._lift.distance(lift)[:, 2]
+        return np.full(len(SIDES), usual) if lift is None else self._lift.distance(lift)[:, 2].copy()
 
     # ------------------------------------------------------------------ now
 
@@ -219,7 +233,7 @@ class References:
 
     def hand_targets(self, contacts: Contacts, palms: Vector) -> list[tuple[Vector, Vector, HandMode]]:
         """Position (3,) [m], velocity (3,) [m/s] and mode of each hand; a free hand is where it is, `palms` (2, 3)."""
-        targets = []
+        targets, lift = [], self._tasks.lifting
         for contact in contacts.hands:
             side = contact.side
             target = (palms[side], np.zeros(3), HandMode.FREE)
@@ -227,9 +241,9 @@ class References:
                 target = (*contact.reference()[:2], contact.mode)
             for reach in self._tasks.reaches:
                 if reach.side == side and reach.progress.active:
-                    target = (*reach.reference()[:2], HandMode.MOVE)
-            if self._tasks.lifting is not None:
-                target = (*self._tasks.lifting.reference(side), self._tasks.lifting.mode)
+                    target = (*reach.reference(), HandMode.MOVE)
+            if lift is not None:
+                target = (*lift.reference(side), lift.mode)
             targets.append(target)
         return targets
 
