@@ -120,8 +120,16 @@ class HorizontalMotion:
                 *rest,
                 *(support.com_velocity, support.com_reference, support.centres, support.centring),
                 *(support.placement_axes, support.placement_lower, support.placement_upper),
-                *(support.lower, support.upper, com_band, urgency, first_curvature, first_gradient),
-                *(self._signs, m, size, sides),
+                support.lower,
+                support.upper,
+                com_band,
+                urgency,
+                first_curvature,
+                first_gradient,
+                self._signs,
+                m,
+                size,
+                sides,
             )
             solution = workspace.solve()
             if solution.status != SolveStatus.SOLVED:
@@ -132,8 +140,13 @@ class HorizontalMotion:
                 *model,
                 *walls,
                 *rest,
-                *(self._ask, self._signs),
-                *(costs.shift, settings.zmp_slack_cost, settings.rest_slack_cost, m, size),
+                self._ask,
+                self._signs,
+                costs.shift,
+                settings.zmp_slack_cost,
+                settings.rest_slack_cost,
+                m,
+                size,
             ):
                 jerk, com, velocity, acceleration, delta_z, zmp_course = courses
                 return Motion(jerk, com, velocity, acceleration, delta_z, zmp_course, steps), solution
