@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wbmpc.planner.horizontal_motion import LARGEST_SHIFT, ZmpModel
+from wbmpc.planner.horizontal_motion import ZmpModel
+from wbmpc.planner.horizontal_problem import LARGEST_SHIFT
 from wbmpc.planner.joint_velocities import FOOT_ROWS, VelocityTasks
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings

@@ -29,7 +29,7 @@ from whole_body_case import (
 
 from wbmpc.planner.bands import NO_FOOT, horizontal_band
 from wbmpc.planner.com_height import HeightPlan
-from wbmpc.planner.horizontal_motion import LARGEST_SHIFT
+from wbmpc.planner.horizontal_problem import LARGEST_SHIFT
 from wbmpc.planner.joint_velocities import FOOT_ROWS
 from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview

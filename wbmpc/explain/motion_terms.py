@@ -6,7 +6,8 @@ import numpy as np
 
 from wbmpc.explain.height_terms import knot_names
 from wbmpc.explain.program import Program, Term, facing, term
-from wbmpc.planner.horizontal_motion import LARGEST_SHIFT, ZmpModel
+from wbmpc.planner.horizontal_motion import ZmpModel
+from wbmpc.planner.horizontal_problem import LARGEST_SHIFT
 from wbmpc.planner.joint_velocities import VelocityTasks
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.jit import kernel, short_kernel
-from wbmpc.planner.horizontal_kernel import End, FreeMotion, HalfPlanes, Matrices, Slots
+from wbmpc.planner.horizontal_kernel import End, FreeMotion, HalfPlanes, Matrices, Slots, slots_of
 from wbmpc.planner.support import MAX_EDGES
 from wbmpc.signals import Vector
 
@@ -14,6 +14,42 @@ KEPT_WORTH = 0.5  # of the price: shifts worth that may be asked for at the next
 
 
 @kernel
+def read_answer(
+    x: Vector,
+    courses: Vector,
+    steps: Vector,
+    unmoved: FreeMotion,
+    matrices: Matrices,
+    state: Vector,
+    a: Vector,
+    b: Vector,
+    offset: Vector,
+    normals: Vector,
+    offsets: Vector,
+    shift: Vector,
+    rest_normals: Vector,
+    rest_offsets: Vector,
+    rest_shift: Vector,
+    ask: bool,
+    signs: Vector,
+    price: float,
+    zmp_cost: float,
+    rest_cost: float,
+    footsteps: int,
+    size: int,
+) -> bool:
+    """`read_motion` into `courses` and `steps`; with `ask`, also `ask_for_shifts`."""
+    n = len(a)
+    read_motion(courses, steps, x, state, matrices, unmoved, footsteps, slots_of(signs, size))
+    if not ask:
+        return False
+    edges = HalfPlanes(normals, offsets, shift, rest_normals, rest_offsets, rest_shift)
+    return ask_for_shifts(
+        *(signs, price, courses, steps, End(a[n - 1], b[n - 1], offset[n - 1]), edges, zmp_cost, rest_cost)
+    )
+
+
+@short_kernel
 def read_motion(
     courses: Vector,
     steps: Vector,
@@ -51,7 +87,7 @@ def read_motion(
             com[k, axis], velocity[k, axis], acceleration[k, axis], zmp[k, axis] = c, v, dv, z
 
 
-@kernel
+@short_kernel
 def ask_for_shifts(
     signs: Vector,
     price: float,

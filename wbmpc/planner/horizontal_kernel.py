@@ -1,4 +1,4 @@
-"""Numbers of the QP of the horizontal CoM motion, in compiled loops; what its solution says: horizontal_answer.py.
+"""Costs and rows of the horizontal CoM motion in compiled loops; all of its QP: horizontal_problem.py.
 
 Written a second time, readably and as one QP with the joint velocities, in tests/planner/joint_form.py.
 """
@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.jit import kernel, short_kernel
+from wbmpc.jit import short_kernel
 from wbmpc.signals import Vector
 
 
@@ -32,6 +32,7 @@ class Costs(NamedTuple):
     position: float
     centre: float
     footstep: float
+    shift: float  # price of a ΔZ
     return_hessian: Vector  # (N, N)
 
 
@@ -71,19 +72,20 @@ class Slots(NamedTuple):
 
 
 @short_kernel
-def most_sides(edges: HalfPlanes) -> int:
-    """How many sides the polygon with the most of them has; the rest of its rows are padding."""
-    most = len(edges.rest_offsets)
-    while most > 0 and np.isinf(edges.rest_offsets[most - 1]) and np.isinf(edges.offsets[:, most - 1]).all():
-        most -= 1
-    return most
+def slots_of(signs: Vector, size: int) -> Slots:
+    """The slots that hold the ΔZ asked for, knot after knot."""
+    slots, count = Slots(np.full(size, -1), np.zeros(size, dtype=np.int64)), 0
+    for k in range(len(signs)):
+        for axis in range(2):
+            if signs[k, axis] != 0.0:
+                slots.knots[count], slots.axes[count] = k, axis
+                count += 1
+    return slots
 
 
-@kernel
-def look_ahead(
-    unmoved: FreeMotion, matrices: Matrices, state: Vector, a: Vector, b: Vector, offset: Vector, edges: HalfPlanes
-) -> int:
-    """Fill `unmoved`, from `state` (2, 3) with the ZMP's model a, b (N,), `offset` (N, 2); gives `most_sides`."""
+@short_kernel
+def look_ahead(unmoved: FreeMotion, matrices: Matrices, state: Vector, a: Vector, b: Vector, offset: Vector) -> None:
+    """Fill `unmoved`, from `state` (2, 3) with the ZMP's model a, b (N,), `offset` (N, 2)."""
     P_ps, P_vs, P_pu, P_au = matrices.P_ps, matrices.P_vs, matrices.P_pu, matrices.P_au
     free, free_velocity, free_zmp, P_zu = unmoved
     for k in range(len(a)):
@@ -96,10 +98,9 @@ def look_ahead(
             free_zmp[k, axis] = a[k] * c - b[k] * state[axis, 2] + offset[k, axis]
         for j in range(len(a)):
             P_zu[k, j] = a[k] * P_pu[k, j] - b[k] * P_au[k, j]
-    return most_sides(edges)
 
 
-@kernel
+@short_kernel
 def write_costs(
     hessian: Vector,
     gradient: Vector,
@@ -164,7 +165,7 @@ def write_costs(
             hessian[first, other * n] += first_curvature[axis, other]
 
 
-@kernel
+@short_kernel
 def write_rows(
     matrix: Vector,
     lower: Vector,

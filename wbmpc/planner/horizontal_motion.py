@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from wbmpc.planner.horizontal_answer import ask_for_shifts, read_motion
-from wbmpc.planner.horizontal_kernel import (
-    Costs,
-    End,
-    FreeMotion,
-    HalfPlanes,
-    Matrices,
-    Slots,
-    look_ahead,
-    write_costs,
-    write_rows,
-)
+from wbmpc.planner.horizontal_answer import read_answer
+from wbmpc.planner.horizontal_kernel import Costs, FreeMotion, Matrices
+from wbmpc.planner.horizontal_problem import size_of_problem, write_problem
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.support import MAX_EDGES
@@ -27,9 +19,7 @@ from wbmpc.qp import QpSolution, QpWorkspace, QuadraticProgram, make_workspace
 from wbmpc.qp.solution import failed
 from wbmpc.signals import SolveStatus, Vector
 
-LARGEST_SHIFT = 1.0  # [m] bound on |ΔZ|
 SIDES = (4, 6, MAX_EDGES)  # of the polygons: problems of three sizes
-NO_SLOTS = (Slots(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)), np.empty(0))
 ROUNDS = 20  # of asking for further shifts; three are rare
 
 
@@ -73,13 +63,11 @@ class HorizontalMotion:
         back = settings.velocity_cost * preview.P_vu.T @ preview.P_vu
         back += settings.position_cost * preview.P_pu.T @ preview.P_pu
         weights = (settings.velocity_cost, settings.position_cost, settings.zmp_centre_cost, settings.footstep_cost)
-        self._costs = Costs(settings.jerk_cost, *weights, back)
+        self._costs = Costs(settings.jerk_cost, *weights, settings.delta_z_price, back)
         self._sizes = (0, n // 2, n, 2 * n) if ask_shift else (0,)
-        self._problems: dict[tuple[int, int, int], QuadraticProgram] = {}
         self._workspaces: dict[tuple[int, int, int], QpWorkspace] = {}
         for key in product((0, MAX_FOOTSTEPS), self._sizes, SIDES):
-            self._problems[key] = self._problem(*key)
-            self._workspaces[key] = make_workspace(backend, self._problems[key])
+            self._workspaces[key] = make_workspace(backend, self._problem(*key))
         self._signs = np.zeros((n, 2))  # of the ΔZ that are variables, first guess for the next plan
 
     def _problem(self, footsteps: int, slots: int, sides: int) -> QuadraticProgram:
@@ -111,70 +99,57 @@ class HorizontalMotion:
         Args:
             first_gradient, first_curvature: (2,) and (2, 2) of ½ uᵀ H u + gᵀ u, the cost of the first jerks to others.
         """
-        settings, matrices, unmoved, n = self._settings, self._matrices, self._unmoved, self._preview.steps
-        m = MAX_FOOTSTEPS if support.lower.any() or support.upper.any() else 0
-        end = End(zmp.a[-1], zmp.b[-1], zmp.offset[-1])
-        edges = HalfPlanes(
-            *(support.normals, support.offsets, support.shift),
-            *(support.rest_normals, support.rest_offsets, support.rest_shift),
+        moved, shifts, most = size_of_problem(
+            support.lower, support.upper, support.offsets, support.rest_offsets, self._signs
         )
-        most = look_ahead(unmoved, matrices, state, zmp.a, zmp.b, zmp.offset, edges)
-        sides = next(size for size in SIDES if size >= most)
-        price = settings.delta_z_price
+        m, sides = MAX_FOOTSTEPS if moved else 0, SIDES[bisect_left(SIDES, most)]
+        settings, costs, n = self._settings, self._costs, self._preview.steps
+        matrices, unmoved = self._matrices, self._unmoved
+        model = (state, zmp.a, zmp.b, zmp.offset)
+        walls = support.normals, support.offsets, support.shift
+        rest = support.rest_normals, support.rest_offsets, support.rest_shift
         for _ in range(ROUNDS):
-            slots, sign = self._slots()
-            size = len(sign)
-            key = (m, size, sides)
-            qp = self._problems[key]
-            write_costs(
-                *(qp.hessian, qp.gradient, self._costs, matrices, unmoved),
-                *(support.com_velocity, support.com_reference, support.centres, support.centring, support.shift),
-                *(m, urgency, first_curvature, first_gradient),
+            size = self._sizes[bisect_left(self._sizes, shifts)]
+            workspace = self._workspaces[m, size, sides]
+            qp = workspace.problem
+            write_problem(
+                *(qp.hessian, qp.gradient, qp.matrix, qp.all_lower, qp.all_upper),
+                *(unmoved, matrices, costs),
+                *model,
+                *walls,
+                *rest,
+                *(support.com_velocity, support.com_reference, support.centres, support.centring),
+                *(support.placement_axes, support.placement_lower, support.placement_upper),
+                support.lower,
+                support.upper,
+                com_band,
+                urgency,
+                first_curvature,
+                first_gradient,
+                self._signs,
+                m,
+                size,
+                sides,
             )
-            write_rows(qp.matrix, qp.lower, qp.upper, matrices, unmoved, end, edges, com_band, m, slots, sides)
-            if m:
-                self._footsteps(qp, support)
-            if size:
-                first = 2 * n + 2 * m
-                qp.gradient[first:] = price * sign
-                qp.x_lower[first:] = np.where(sign > 0.0, 0.0, -LARGEST_SHIFT)
-                qp.x_upper[first:] = np.where(sign < 0.0, 0.0, LARGEST_SHIFT)
-            solution = self._workspaces[key].solve()
+            solution = workspace.solve()
             if solution.status != SolveStatus.SOLVED:
                 return None, solution
             courses, steps = np.empty((6, n, 2)), np.empty((MAX_FOOTSTEPS, 2))
-            read_motion(courses, steps, solution.x, state, matrices, unmoved, m, slots)
-            if not self._ask or not ask_for_shifts(
-                *(self._signs, price, courses, steps, end, edges),
-                *(settings.zmp_slack_cost, settings.rest_slack_cost),
+            if not read_answer(
+                *(solution.x, courses, steps, unmoved, matrices),
+                *model,
+                *walls,
+                *rest,
+                self._ask,
+                self._signs,
+                costs.shift,
+                settings.zmp_slack_cost,
+                settings.rest_slack_cost,
+                m,
+                size,
             ):
                 jerk, com, velocity, acceleration, delta_z, zmp_course = courses
                 return Motion(jerk, com, velocity, acceleration, delta_z, zmp_course, steps), solution
+            shifts = int(np.count_nonzero(self._signs))
         self._signs[:] = 0.0
         return None, failed(qp, SolveStatus.ITERATION_LIMIT, ROUNDS, solution.solve_time)
-
-    def _slots(self) -> tuple[Slots, Vector]:
-        """The slots that hold the ΔZ asked for, and their signs; 0 of an unused one, a variable on its own."""
-        if not self._signs.any():
-            return NO_SLOTS
-        knots, axes = np.nonzero(self._signs)
-        count = len(knots)
-        size = next(size for size in self._sizes if size >= count)
-        slots, sign = Slots(np.full(size, -1), np.zeros(size, dtype=np.int64)), np.zeros(size)
-        slots.knots[:count], slots.axes[:count], sign[:count] = knots, axes, self._signs[knots, axes]
-        return slots, sign
-
-    def _footsteps(self, qp: QuadraticProgram, support: SupportPreview) -> None:
-        """Where the coming footsteps may be: beside the one before, and within the swing foot's reach in time."""
-        m, first = MAX_FOOTSTEPS, 2 * self._preview.steps
-        last_rows = slice(qp.rows - 2 * m, qp.rows)
-        rows = qp.matrix[last_rows].reshape(m, 2, -1)
-        each = np.arange(m)
-        for axis in range(2):
-            columns = first + axis * m + each
-            rows[each, :, columns] = support.placement_axes[:, :, axis]
-            rows[each[1:], :, columns[:-1]] = -support.placement_axes[1:, :, axis]
-        qp.lower[last_rows] = support.placement_lower.ravel()
-        qp.upper[last_rows] = support.placement_upper.ravel()
-        steps = slice(first, first + 2 * m)
-        qp.x_lower[steps], qp.x_upper[steps] = support.lower.T.ravel(), support.upper.T.ravel()
