@@ -84,7 +84,7 @@ class Recorder:
         self._sampled = Table(SAMPLED, sizes, -(-expected_ticks // stride))
         self.names = self._every.names + self._sampled.names  # of all columns, each an attribute of the recorder
         self._tables = {name: table for table in (self._every, self._sampled) for name in table.names}
-        self._state = _states(self._every.row.reshape(1)).data  # bytes for the hash
+        self._state = self._every.bytes_of("qpos", "qvel")
         self._contact_capacity = 12 * max(1, expected_ticks)
         self._contact_total = 0
         self._contacts = self._allocate_contacts(self._contact_capacity)
@@ -104,12 +104,11 @@ class Recorder:
             ValueError: on the first tick, when a value's shape is not the declared one.
         """
         k = self._ticks
-        self._every.put(k, _truth(truth) + _outcome(command))
+        row = self._every.put(k, _truth(truth) + _outcome(command))
         if k % self.stride == 0:
             self._sampled.put(k // self.stride, _state(state) + _setpoint(setpoint) + _command(command))
         self._append_contacts(truth)
-        # The row's cells, not the caller's arrays: always contiguous float64, so equal states give equal bytes.
-        self._hash.update(self._state)
+        self._hash.update(row[self._state])
         self._ticks = k + 1  # last: a reader in another thread never sees a half-written row
 
     def append_plan(self, plan: PlanReport, snapshot: RobotState | None = None) -> None:

@@ -83,7 +83,7 @@ def assemble(
         hand_acceleration=palm_acceleration,
         hand_jerk=palm_jerk,
         hand_urgency=urgency,
-        hand_force=report.contact_force[:, 0],
+        hand_force=report.contact_force[:, 0].copy(),
         hand_force_cap=caps[:, 0],
         hand_force_cap_rate=(caps[:, 1] - caps[:, 0]) / period,
         hand_force_cap_top=top,
