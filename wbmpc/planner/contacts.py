@@ -99,10 +99,8 @@ class Contacts:
     @property
     def posture(self) -> Posture | None:
         """The posture that has every hand with a contact on its patch and the CoM over the feet; None without one."""
-        goals = [c for c in self.hands if c.has_goal]
-        if len(goals) > 1:
-            return self._together
-        return self.candidates.of(goals[0].patch, goals[0].side).posture if goals else None
+        used = self._used
+        return used[0].posture if len(used) == 1 else self._together if used else None
 
     @property
     def _used(self) -> list[Candidate]:

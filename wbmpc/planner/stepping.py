@@ -111,9 +111,10 @@ class Stepping:
         # lateral and turning motion are taken by one foot, for two steps; the forward one by both
         width = settings.step_width + turning_room(settings, yaw - float(feet.yaws[stance]))
         offset = np.array([vx * period, SIDE_SIGN[side] * width + (2.0 * period * vy if side == sideways else 0.0)])
-        half_turn = plane_rotation(0.5 * (float(feet.yaws[stance]) + yaw))
+        shift = plane_rotation(0.5 * (float(feet.yaws[stance]) + yaw)) @ offset
+        apart = SIDE_SIGN[side] * plane_rotation(float(feet.yaws[stance]))[:, 1]
         position = feet.positions[stance].copy()
-        position[:2] += half_turn @ offset
+        position[:2] += shift + max(settings.narrowest - float(apart @ shift), 0.0) * apart  # a fast turn backwards
         return Footstep(
             side=side,
             position=position,
