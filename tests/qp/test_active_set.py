@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from random_problems import kkt_residual, random_problem
 
 from wbmpc.qp import QuadraticProgram, daqp_workspace, make_workspace
@@ -20,8 +20,14 @@ from wbmpc.signals import SolveStatus, Vector
 def guess(problem: QuadraticProgram, active: Vector) -> tuple[int, Vector]:
     """Rounds (0: not found) and x; `active` is overwritten."""
     softness = np.divide(1.0, problem.soft_weight, out=np.zeros(problem.rows), where=problem.soft_weight > 0.0)
-    bounds = problem.all_lower, problem.all_upper
-    return solve_from_guess(problem.hessian, problem.gradient, problem.matrix, *bounds, softness, active)
+    bounds, factor = (problem.all_lower, problem.all_upper), np.zeros_like(problem.hessian)
+    arguments = (problem.hessian, problem.gradient, problem.matrix, *bounds, softness, active, factor)
+    rounds, x = solve_from_guess(*arguments, False)
+    if rounds:  # the factor that is left belongs to the set that is left
+        again, same = solve_from_guess(*arguments, True)
+        assert again == 1
+        assert_array_equal(same, x)
+    return rounds, x
 
 
 def nothing(problem: QuadraticProgram) -> Vector:
@@ -57,6 +63,15 @@ def test_what_is_found_from_any_guess_is_the_optimum_and_its_set(
     again, same = guess(problem, active)
     assert again == 1, "the set that is left is the optimum's"
     assert_allclose(same, x, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", [11, 286, 377, 516])
+def test_a_set_already_tried_is_left_by_changing_half(seed: int) -> None:
+    """These four go round in circles from the empty set."""
+    problem = random_problem(np.random.default_rng(seed), 6, 10, soft=10)
+    rounds, x = guess(problem, nothing(problem))
+    assert 0 < rounds <= MOST_ROUNDS
+    assert kkt_residual(problem, x) < 1e-6
 
 
 @settings(max_examples=100, deadline=None)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.jit import kernel
+from wbmpc.jit import kernel, short_kernel
 from wbmpc.qp.cholesky import add_product, backward, factor, forward, forward_all, products_of_columns, substitute
 from wbmpc.qp.verdicts import SOUND, soundness
 from wbmpc.signals import Vector
 
-MOST_ROUNDS = 6
+MOST_ROUNDS = 15  # of one start
 TOLERANCE = 1e-9  # relative, of a bound or a multiplier's sign
 DEPENDENT = 1e-10  # squared share of an active row that the others do not already say; below it is too near to them
 
@@ -24,26 +24,31 @@ def solve_from_guess(
     all_upper: Vector,
     softness: Vector,
     active: NDArray[np.int8],
+    U: Vector,
+    factored: bool,
 ) -> tuple[int, Vector]:
     """Minimise ½ xᵀ H x + gᵀ x + ½ Σ s_i² / d_i within bounds and rows: rounds (0: not found) and x (n,).
 
     What `active` (n + m,) says, variables first, holds with equality: 1 at the upper bound, -1 at the lower. Whoever is
     violated joins, whoever has a multiplier of the wrong sign leaves, all at once, until nobody does: then all
-    conditions of the optimum hold, and H being positive definite it is the only one. That need not come to an end; it
-    is given up after MOST_ROUNDS, and where active rows all but depend on each other. `active` is overwritten: by the
-    optimum's set, or by zeros where none was found.
+    conditions of the optimum hold, and H being positive definite it is the only one. Where that would lead back to a
+    set already tried, every second change is left out. Still it need not come to an end; it is given up after
+    MOST_ROUNDS, and where active rows all but depend on each other. `active` is overwritten: by the optimum's set, or
+    by zeros where none was found.
 
     Args:
         all_lower, all_upper: (n + m,) of variables, then rows; they do not cross.
         softness: (m,) d, 0 for a hard row.
+        U: (n, n) becomes the factor below of the optimum's set; with `factored` it is that of this H and `active`.
 
     The variables at their bounds are fixed; with Uᵀ U = H over the others and Y = U⁻ᵀ Aᵀ of the active rows, their
     multipliers solve (Yᵀ Y + D) λ = Yᵀ z − b, z = −U⁻ᵀ g, and x = U⁻¹ (z − Y λ).
     """
     n, m = len(gradient), len(softness)
     x, nothing = np.empty(n), (0, np.empty(0))
-    U, start, z, free = np.empty((n, n)), np.empty(n), np.empty(n), np.empty(n, np.int64)
+    start, z, free = np.empty(n), np.empty(n), np.empty(n, np.int64)
     rows, value = np.empty(m, np.int64), np.empty(m)
+    tried = np.empty((MOST_ROUNDS, n + m), np.int8)
     count, refactor = 0, True
     for rounds in range(1, MOST_ROUNDS + 1):
         if refactor:
@@ -57,14 +62,16 @@ def solve_from_guess(
             for a in range(count):
                 i = free[a]
                 start[a] = -gradient[i]
-                for b in range(a, count):
-                    U[a, b] = hessian[i, free[b]]
+                if not factored:
+                    for b in range(a, count):
+                        U[a, b] = hessian[i, free[b]]
                 if count < n:
                     for j in range(n):
                         if active[j] != 0:
                             start[a] -= hessian[i, j] * x[j]
-            if not factor(U, count):
+            if not (factored or factor(U, count)):
                 break
+            factored = False  # for the next set
             forward(U, start, count)
         z[:count] = start[:count]
         held = 0
@@ -111,6 +118,7 @@ def solve_from_guess(
         if not finite:
             break
         changed = refactor = False
+        tried[rounds - 1] = active
         if count < n:
             for j in range(n):
                 if active[j] == 0 or all_lower[j] == all_upper[j]:
@@ -148,8 +156,34 @@ def solve_from_guess(
                 active[n + r], changed = -1, True
         if not (changed or refactor):
             return rounds, x
+        if _is_among(tried[:rounds], active):
+            _halve_changes(active, tried[rounds - 1])
     active[:] = 0
     return nothing
+
+
+@short_kernel
+def _is_among(tried: NDArray[np.int8], active: NDArray[np.int8]) -> bool:
+    for known in tried:
+        same = True
+        for i in range(len(active)):
+            if known[i] != active[i]:
+                same = False
+                break
+        if same:
+            return True
+    return False
+
+
+@short_kernel
+def _halve_changes(active: NDArray[np.int8], before: NDArray[np.int8]) -> None:
+    """Take back every second change since `before`."""
+    keep = True
+    for i in range(len(active)):
+        if active[i] != before[i]:
+            if not keep:
+                active[i] = before[i]
+            keep = not keep
 
 
 @kernel
@@ -161,11 +195,16 @@ def examine_and_guess(
     all_upper: Vector,
     softness: Vector,
     active: NDArray[np.int8],
+    U: Vector,
+    factored: bool,
     matrices_changed: bool,
 ) -> tuple[int, int, Vector]:
-    """The data's `soundness`, then what `solve_from_guess` finds; nothing when they are not SOUND."""
+    """The data's `soundness`, then what `solve_from_guess` finds, or finds from the empty set; nothing if not SOUND."""
     verdict = soundness(hessian.reshape(-1), gradient, matrix.reshape(-1), all_lower, all_upper, matrices_changed)
     if verdict != SOUND:
         return verdict, 0, np.empty(0)
-    rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active)
+    guessed = active.any()
+    rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active, U, factored)
+    if rounds == 0 and guessed:
+        rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active, U, False)
     return verdict, rounds, x

@@ -54,6 +54,7 @@ class DaqpWorkspace:
         self._softness = np.zeros(problem.rows)
         self._softness[problem.soft_rows] = 1.0 / problem.soft_weight[problem.soft_rows]
         self._active = np.zeros(problem.all_lower.size, dtype=np.int8)
+        self._factor, self._factored = np.zeros_like(problem.hessian), False  # of the last solve's active set
         self._model: daqp.Model | None = None  # None: nothing to warm-start from
         self._stale = False  # the model has not seen the matrices of the last solve
 
@@ -63,8 +64,10 @@ class DaqpWorkspace:
         problem = self.problem
         verdict, rounds, x = examine_and_guess(
             *(problem.hessian, problem.gradient, problem.matrix, problem.all_lower, problem.all_upper),
-            *(self._softness, self._active, matrices_changed or self._model is None),
+            *(self._softness, self._active, self._factor, self._factored and not matrices_changed),
+            matrices_changed or self._model is None,
         )
+        self._factored = rounds > 0
         defect = DEFECTS[verdict]
         if defect is not None:
             if matrices_changed:
