@@ -18,8 +18,8 @@ def read_answer(
     x: Vector,
     courses: Vector,
     steps: Vector,
-    unmoved: FreeMotion,
-    matrices: Matrices,
+    unmoved: tuple[Vector, ...],
+    matrices: tuple[Vector, ...],
     state: Vector,
     a: Vector,
     b: Vector,
@@ -40,7 +40,9 @@ def read_answer(
 ) -> bool:
     """`read_motion` into `courses` and `steps`; with `ask`, also `ask_for_shifts`."""
     n = len(a)
-    read_motion(courses, steps, x, state, matrices, unmoved, footsteps, slots_of(signs, size))
+    read_motion(
+        *(courses, steps, x, state, Matrices(*matrices), FreeMotion(*unmoved), footsteps, slots_of(signs, size))
+    )
     if not ask:
         return False
     edges = HalfPlanes(normals, offsets, shift, rest_normals, rest_offsets, rest_shift)

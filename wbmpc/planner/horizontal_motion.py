@@ -58,12 +58,13 @@ class HorizontalMotion:
         """`ask_shift`: ΔZ is a variable, or 0."""
         n = preview.steps
         self._preview, self._settings, self._ask = preview, settings, ask_shift
-        self._matrices = Matrices(preview.P_ps, preview.P_vs, preview.P_pu, preview.P_vu, preview.P_au)
-        self._unmoved = FreeMotion(np.zeros((2, n)), np.zeros((2, n)), np.zeros((n, 2)), np.zeros((n, n)))
+        self._matrices = tuple(Matrices(preview.P_ps, preview.P_vs, preview.P_pu, preview.P_vu, preview.P_au))
+        self._unmoved = tuple(FreeMotion(np.zeros((2, n)), np.zeros((2, n)), np.zeros((n, 2)), np.zeros((n, n))))
         back = settings.velocity_cost * preview.P_vu.T @ preview.P_vu
         back += settings.position_cost * preview.P_pu.T @ preview.P_pu
         weights = (settings.velocity_cost, settings.position_cost, settings.zmp_centre_cost, settings.footstep_cost)
-        self._costs = Costs(settings.jerk_cost, *weights, settings.delta_z_price, back)
+        self._costs = tuple(Costs(settings.jerk_cost, *weights, settings.delta_z_price, back))
+        self._prices = settings.delta_z_price, settings.zmp_slack_cost, settings.rest_slack_cost
         self._sizes = (0, n // 2, n, 2 * n) if ask_shift else (0,)
         self._workspaces: dict[tuple[int, int, int], QpWorkspace] = {}
         for key in product((0, MAX_FOOTSTEPS), self._sizes, SIDES):
@@ -103,21 +104,19 @@ class HorizontalMotion:
             support.lower, support.upper, support.offsets, support.rest_offsets, self._signs
         )
         m, sides = MAX_FOOTSTEPS if moved else 0, SIDES[bisect_left(SIDES, most)]
-        settings, costs, n = self._settings, self._costs, self._preview.steps
-        matrices, unmoved = self._matrices, self._unmoved
-        model = (state, zmp.a, zmp.b, zmp.offset)
-        walls = support.normals, support.offsets, support.shift
-        rest = support.rest_normals, support.rest_offsets, support.rest_shift
+        n, matrices, unmoved = self._preview.steps, self._matrices, self._unmoved
+        model = (
+            *(state, zmp.a, zmp.b, zmp.offset, support.normals, support.offsets, support.shift),
+            *(support.rest_normals, support.rest_offsets, support.rest_shift),
+        )
         for _ in range(ROUNDS):
             size = self._sizes[bisect_left(self._sizes, shifts)]
             workspace = self._workspaces[m, size, sides]
             qp = workspace.problem
             write_problem(
                 *(qp.hessian, qp.gradient, qp.matrix, qp.all_lower, qp.all_upper),
-                *(unmoved, matrices, costs),
+                *(unmoved, matrices, self._costs),
                 *model,
-                *walls,
-                *rest,
                 *(support.com_velocity, support.com_reference, support.centres, support.centring),
                 *(support.placement_axes, support.placement_lower, support.placement_upper),
                 support.lower,
@@ -138,13 +137,9 @@ class HorizontalMotion:
             if not read_answer(
                 *(solution.x, courses, steps, unmoved, matrices),
                 *model,
-                *walls,
-                *rest,
                 self._ask,
                 self._signs,
-                costs.shift,
-                settings.zmp_slack_cost,
-                settings.rest_slack_cost,
+                *self._prices,
                 m,
                 size,
             ):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -54,9 +54,9 @@ def write_problem(
     matrix: Vector,
     all_lower: Vector,
     all_upper: Vector,
-    unmoved: FreeMotion,
-    matrices: Matrices,
-    costs: Costs,
+    unmoved: tuple[Vector, ...],
+    matrices: tuple[Vector, ...],
+    costs: tuple[Any, ...],
     state: Vector,
     a: Vector,
     b: Vector,
@@ -87,20 +87,22 @@ def write_problem(
 ) -> None:
     """All numbers of a problem (a `QuadraticProgram`) that may differ from the last time's; fills `unmoved`.
 
-    The arguments are those of the functions below, in the order of `HorizontalMotion.solve`.
+    The arguments are those of the functions below, in the order of `HorizontalMotion.solve`; named tuples are plain
+    here, because numba takes twice as long to unpack them.
     """
+    free_motion, preview, prices = FreeMotion(*unmoved), Matrices(*matrices), Costs(*costs)
     n, variables = len(a), len(gradient)
     first = 2 * n + 2 * footsteps
     edges = HalfPlanes(normals, offsets, shift, rest_normals, rest_offsets, rest_shift)
     end = End(a[n - 1], b[n - 1], offset[n - 1])
     slots = slots_of(signs, size)
-    look_ahead(unmoved, matrices, state, a, b, offset)
+    look_ahead(free_motion, preview, state, a, b, offset)
     write_costs(
-        *(hessian, gradient, costs, matrices, unmoved, com_velocity, com_reference, centres, centring, shift),
+        *(hessian, gradient, prices, preview, free_motion, com_velocity, com_reference, centres, centring, shift),
         *(footsteps, urgency, first_curvature, first_gradient),
     )
     write_rows(
-        *(matrix, all_lower[variables:], all_upper[variables:], matrices, unmoved, end, edges, com_band),
+        *(matrix, all_lower[variables:], all_upper[variables:], preview, free_motion, end, edges, com_band),
         *(footsteps, slots, sides),
     )
     if footsteps:
@@ -110,7 +112,7 @@ def write_problem(
         sign = 0.0
         if slots.knots[i] >= 0:
             sign = signs[slots.knots[i], slots.axes[i]]
-        gradient[first + i] = costs.shift * sign
+        gradient[first + i] = prices.shift * sign
         all_lower[first + i] = 0.0 if sign > 0.0 else -LARGEST_SHIFT
         all_upper[first + i] = 0.0 if sign < 0.0 else LARGEST_SHIFT
 
