@@ -12,7 +12,7 @@ PACKAGE = ROOT / "wbmpc"
 FILES = sorted(PACKAGE.rglob("*.py"))
 MAX_LINES = 300
 
-BASE = {"signals", "errors", "strict", "rotations", "jit"}
+BASE = {"record", "signals", "errors", "strict", "rotations", "jit"}
 ROBOT = BASE | {"model_contract", "robot", "kinematics", "frame_terms"}
 SETTINGS = BASE | {"settings", "scenario"}
 CONTROLLER = ROBOT | SETTINGS | {"qp"}
@@ -23,6 +23,7 @@ LOOP = CONTROLLER | RECORDS | {"initial", "plant", "estimator", "planner", "trac
 # qp <- planner, tracker} <- loop <- session <- commands; checks see signals, recorder and the settings of the checks.
 ALLOWED = {
     "__init__": set(),
+    "record": BASE,
     "signals": BASE,
     "errors": BASE,
     "strict": BASE,

@@ -1,4 +1,4 @@
-"""Every arrow of the block diagram: frozen dataclasses with shapes, units and frames.
+"""Every arrow of the block diagram: records with shapes, units and frames.
 
 Conventions, everywhere in the project:
   * SI units; world axes, z up; `GRAVITY` = 9.81 m/s².
@@ -9,11 +9,12 @@ Conventions, everywhere in the project:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+
+from wbmpc.record import record
 
 Vector = NDArray[np.float64]
 GRAVITY = 9.81  # [m/s²]
@@ -54,7 +55,7 @@ class ContactPhase(IntEnum):
     RELEASED = 8
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Measurement:
     """What the robot's own sensors say at one tick (noise included)."""
 
@@ -68,7 +69,7 @@ class Measurement:
     palm_force_in_world: Vector  # (2, 3) [N] palm force sensors
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class RobotState:
     """The estimator's answer: everything the controller knows of the robot."""
 
@@ -80,7 +81,7 @@ class RobotState:
     mass_scale: float  # estimated total mass / model mass
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TargetMove:
     """An order to the planner in the middle of a run: from its next plan on the target of a reach is elsewhere."""
 
@@ -88,7 +89,7 @@ class TargetMove:
     target: Vector  # (3,) [m] in world
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Setpoint:
     """What the tracker follows at one tick, sampled from the latest plan."""
 
@@ -118,7 +119,7 @@ class Setpoint:
     arm_keep_out: Vector  # (2, 3, 5) half-spaces a·x ≥ b of palm, a point between and elbow; a, b (-inf: none), share
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class TorqueCommand:
     """The tracker's answer at one tick."""
 
@@ -131,7 +132,7 @@ class TorqueCommand:
     fallback: bool  # the command is not this tick's solution
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class CandidateReport:
     """One candidate contact as stage 3 saw it when it fired: what it would cost and give, why it won or lost.
 
@@ -156,7 +157,7 @@ class CandidateReport:
     reason: str  # "chosen", "unreachable by 3.2 cm", "cost 1.8 above the best", ...
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Firing:
     """One firing of stage 3: what it was asked, at k knots, and what it made of every candidate."""
 
@@ -168,7 +169,7 @@ class Firing:
     candidates: tuple[CandidateReport, ...]  # all of them, those that were not weighed too
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class StageReport:
     """One solve of one stage."""
 
@@ -177,7 +178,7 @@ class StageReport:
     iterations: int
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PlanReport:
     """The plan as the recording and the checks see it. N knots at times t + T, ..., t + N T."""
 
@@ -207,7 +208,7 @@ class PlanReport:
         return self.firing.candidates if self.firing else ()
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Truth:
     """What really happens in the plant at one tick; for the recorder and the checks, never for the controller."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need, force_price, shift_bound, shift_rows
 from wbmpc.planner.contact_stage import ChoosesContacts
 from wbmpc.planner.settings import ContactSettings
+from wbmpc.record import record
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, Vector
 
@@ -45,7 +46,7 @@ class CostParts(NamedTuple):
 NO_COST = CostParts(np.nan, np.nan, np.nan)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Weighed:
     """One candidate beside those it would have as company."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,10 +10,11 @@ from wbmpc.jit import kernel
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import HeightSettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
+from wbmpc.record import record
 from wbmpc.signals import SolveStatus, Vector
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class HeightPlan:
     """Stage 1's answer over the horizon, all (N,)."""
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from wbmpc.planner.contact_force import (
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import MAX_EDGES
 from wbmpc.qp import QpSolution, QuadraticProgram, make_mip_workspace
+from wbmpc.record import record
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SIDES, SolveStatus, Vector
 
@@ -26,7 +26,7 @@ KNOTS = 2  # at which stage 3 asks for a choice
 CROSSING_GAP = 0.05  # [m] by which the left hand's contact is to the left of the right hand's
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Option:
     """One hand on one patch."""
 
@@ -36,7 +36,7 @@ class Option:
     held: bool = False  # taken already: H_i = 1
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Choice:
     """Stage 3's answer when it fires."""
 

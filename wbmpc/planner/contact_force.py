@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import MAX_EDGES, SupportPolygon
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
+from wbmpc.record import record
 from wbmpc.rotations import contact_frame
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import GRAVITY, SolveStatus, Vector
@@ -18,7 +19,7 @@ PADDING = 1e3  # [m] offset of a padded edge: f_z ≤ the feet's weight
 POLYGON_PRICE = 1e4  # of a soft polygon row, in prices of the shift
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Need:
     """The ZMP shift that stage 2 asks for over n knots, and what it takes to turn it into a force."""
 

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbmpc.planner.candidates import Candidate, Candidates
 from wbmpc.planner.contact_choice import Option
 from wbmpc.planner.contact_force import Need
 from wbmpc.planner.support import SupportPolygon
+from wbmpc.record import record
 from wbmpc.signals import SIDES, Firing, StageReport, Vector
 
 RESERVE = 0.012  # [m] of the feet's pressure inside its polygon that a contact should leave, if any does
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Asked:
     """The knots that a choice is made for."""
 

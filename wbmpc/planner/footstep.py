@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wbmpc.record import record
 from wbmpc.rotations import plane_rotation
 from wbmpc.signals import Vector
 
@@ -34,7 +35,7 @@ class Footstep:
         return phase**3 * (10.0 - 15.0 * phase + 6.0 * phase**2)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SoleReferences:
     """Where both soles should be now, and how they should move: those that stand stay."""
 
@@ -45,7 +46,7 @@ class SoleReferences:
     accelerations: Vector  # (2, 3) [m/s²]
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Feet:
     """Where both feet stand, or will stand; the steps are planned from this."""
 

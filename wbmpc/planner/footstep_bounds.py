@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbmpc.planner.footstep import SIDE_SIGN, Feet, Footstep
@@ -11,12 +9,13 @@ from wbmpc.planner.settings import GaitSettings
 from wbmpc.planner.stepping import turning_room
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS
 from wbmpc.planner.swing import Swing
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 FARTHEST = 0.3  # [m] of a footstep from its reference
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class FootstepBounds:
     """The fields of `SupportPreview` that say where footsteps may go; unused footsteps are fixed at 0."""
 

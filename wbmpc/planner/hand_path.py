@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbmpc.jit import kernel, short_kernel
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 LEAD = (0.0, 0.6)  # part of σ in which the leading component moves
@@ -28,7 +27,7 @@ def minimum_jerk(phase: float) -> tuple[float, float, float]:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class HandPath:
     """From `start` to `end` (3,) in world [m], staying on the side that `away` points to.
 
@@ -95,7 +94,7 @@ def _positions(start: Vector, end: Vector, away: Vector, sigmas: Vector) -> Vect
     return out
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Landing:
     """The way of least ∫|a|² from a palm in motion onto a surface that it meets at a given velocity: a cubic in time.
 

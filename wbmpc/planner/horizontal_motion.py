@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -17,13 +16,14 @@ from wbmpc.planner.support import MAX_EDGES
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.qp import QpSolution, QpWorkspace, QuadraticProgram, make_workspace
 from wbmpc.qp.solution import failed
+from wbmpc.record import record
 from wbmpc.signals import SolveStatus, Vector
 
 SIDES = (4, 6, MAX_EDGES)  # of the polygons: problems of three sizes
 ROUNDS = 20  # of asking for further shifts; three are rare
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class ZmpModel:
     """Z = a c − b c̈ + j over the horizon (see zmp_model.py), the same a, b for both axes."""
 
@@ -32,7 +32,7 @@ class ZmpModel:
     offset: Vector  # (N, 2) [m] j
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Motion:
     """The horizontal CoM over the horizon."""
 

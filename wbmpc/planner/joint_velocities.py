@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,13 +9,14 @@ from wbmpc.jit import kernel
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
 from wbmpc.qp.cholesky import add_squares, factor, forward
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 FOOT_ROWS = 12  # two soles, six rows each
 AT_BOUND = 1e-9  # [m/s, rad/s] from a bound, a velocity is held by it
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class VelocityTasks:
     """What stage 2's joint velocities q̇ should do now, linearised at the planner's own configuration."""
 
@@ -37,7 +36,7 @@ class VelocityTasks:
     upper: Vector  # (nv,)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class VelocityCost:
     """V(v) near `at`: what a horizontal CoM velocity v (2,) [m/s] costs the joint velocities that must follow it.
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
 from wbmpc.planner.footholds import Footholds
 from wbmpc.planner.footstep import ALIGNED, CAREFUL_LEAD, SIDE_SIGN, Feet, Footstep
 from wbmpc.planner.settings import GaitSettings
+from wbmpc.record import record
 from wbmpc.rotations import plane_rotation
 from wbmpc.scenario import GoTask
 from wbmpc.signals import Vector
@@ -22,7 +22,7 @@ SHORT_STRIDE = 0.16  # [m] over an edge: before a longer one all widths are trie
 MOST_FOUND = 64  # steps that are remembered
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class _Place:
     """Where a foot might go."""
 

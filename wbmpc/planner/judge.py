@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,10 +16,11 @@ from wbmpc.planner.settings import PlannerSettings
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
 from wbmpc.planner.zmp_model import need_at_rest, need_of
+from wbmpc.record import record
 from wbmpc.signals import Firing, StageReport, Vector
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Judgement:
     """What stages 2 and 3 say to the need for a contact."""
 

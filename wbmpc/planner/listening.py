@@ -5,13 +5,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from wbmpc.planner.planner import Planner
+from wbmpc.record import record
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Call:
     """One call of a stage."""
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from wbmpc.planner.settings import ContactSettings
+from wbmpc.record import record
 
 ARRIVED, ROUGHLY_ARRIVED = 0.012, 0.05  # [m] palm error at the clearance point below which the descent begins
 
@@ -20,7 +20,7 @@ def way_time(settings: ContactSettings, distance: float) -> float:
     return math.sqrt(6.0 * distance / settings.urgent_acceleration)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Pace:
     """Speeds and times of one approach, between the careful (urgency 0) and the urgent (1) end of the settings."""
 

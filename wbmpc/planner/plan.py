@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.planner.com_height import HeightPlan
 from wbmpc.planner.horizontal_motion import Motion
 from wbmpc.planner.plan_kernel import com_at, continue_plan
+from wbmpc.record import record
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Plan:
     """References from the snapshot's time on. Interpolation lives here and nowhere else.
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pinocchio as pin
 
@@ -11,6 +9,7 @@ from wbmpc.frame_terms import chains_of
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.posture_kernel import Targets, posture_step
 from wbmpc.planner.support import UNEVEN
+from wbmpc.record import record
 from wbmpc.rotations import heading_of, level_frame
 from wbmpc.signals import Vector
 
@@ -20,7 +19,7 @@ SETTLED = 2e-3  # [rad, m] step below which a posture says whether its targets a
 JOINT_MARGIN = 0.05  # [rad] kept from the joints' ends: a fully stretched arm cannot be controlled
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class PalmTarget:
     """Where a palm should be; on a surface with the outward `normal` (3,) its elbow stays above that surface."""
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.swing import Swing
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Stride:
     """The step ahead or under way, as far as the CoM is concerned."""
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from wbmpc.jit import kernel
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 PROJECTIONS = 20
@@ -60,7 +61,7 @@ def is_corner(a: Vector, b: Vector, p: Vector) -> bool:
     return turn > COLLINEAR or (turn > 0.0 and ux * vx + uy * vy < 0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SupportPolygon:
     """Half-planes `normals @ z <= offsets` of a convex polygon, padded to MAX_EDGES rows.
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.support import SupportPolygon, foot_corners
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Transfer:
     """The load goes from foot to foot: shares of left and right go linearly from `before` to `after`."""
 
@@ -29,7 +28,7 @@ class Transfer:
         return cls(end - step.double_support, before, shares[1 - step.side])
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class Interval:
     """Until `end` the robot stands on `feet`, but for a foot that swings.
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from wbmpc.planner.support import SupportPolygon
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 MAX_FOOTSTEPS = 4  # landings within one horizon; later ones are not planned yet
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class SupportPreview:
     """Half-planes of every knot, at the footsteps' reference places, and how they move with the footsteps.
 

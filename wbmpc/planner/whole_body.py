@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from wbmpc.planner.horizontal_motion import HorizontalMotion, Motion, ZmpModel
 from wbmpc.planner.joint_velocities import JointVelocities, VelocityTasks
 from wbmpc.planner.preview import Preview
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.qp import QpSolution
+from wbmpc.record import record
 from wbmpc.signals import Vector
 
 ROUNDS = 5  # between CoM and joints; one or two do, and what is left after five is the backend's own error
 SLOPE_TOLERANCE = 1e-6  # [cost / (m/s)] of what a CoM velocity costs the joints: 1e-6 m/s³ of the first jerk
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class HorizontalPlan(Motion):
     """Stage 2's answer."""
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from wbmpc.qp.problem import QuadraticProgram
+from wbmpc.record import record
 from wbmpc.signals import SolveStatus, Vector
 
 
-@dataclass(frozen=True, slots=True)
+@record
 class QpSolution:
     """One solve. `x` is nan unless the status is SOLVED, so that a forgotten status cannot pass for a solution."""
 
