@@ -70,7 +70,9 @@ def test_the_slope_changes_by_the_curvature_while_no_joint_meets_a_bound(seed: i
     before, after = joints.solve(np.zeros(2))[1], joints.solve(np.array([x, y]))[1]
     assert before is not None
     assert after is not None
-    assert_allclose(after.gradient, before.slope(np.array([x, y])), atol=1e-5)
+    gradient, curvature = before.of_first_jerk(np.array([x, y]), 0.3)
+    assert_allclose(0.3 * after.gradient, gradient, atol=1e-5)
+    assert_allclose(0.09 * after.curvature, curvature, atol=1e-5)
     assert (np.linalg.eigvalsh(before.curvature) > -1e-6).all()
 
 

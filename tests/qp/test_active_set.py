@@ -22,10 +22,10 @@ def guess(problem: QuadraticProgram, active: Vector) -> tuple[int, Vector]:
     softness = np.divide(1.0, problem.soft_weight, out=np.zeros(problem.rows), where=problem.soft_weight > 0.0)
     bounds, factor = (problem.all_lower, problem.all_upper), np.zeros_like(problem.hessian)
     arguments = (problem.hessian, problem.gradient, problem.matrix, *bounds, softness, active, factor)
-    rounds, x = solve_from_guess(*arguments, False)
+    x, same = np.zeros(problem.variables), np.zeros(problem.variables)
+    rounds = solve_from_guess(*arguments, False, x)
     if rounds:  # the factor that is left belongs to the set that is left
-        again, same = solve_from_guess(*arguments, True)
-        assert again == 1
+        assert solve_from_guess(*arguments, True, same) == 1
         assert_array_equal(same, x)
     return rounds, x
 
@@ -91,7 +91,7 @@ def test_a_workspace_that_guesses_follows_changing_data(problem: QuadraticProgra
 def test_a_workspace_mostly_guesses_right_while_the_data_change_slowly(monkeypatch: pytest.MonkeyPatch) -> None:
     rng, rounds = np.random.default_rng(8), []
 
-    def counted(*arguments: Any) -> tuple[int, int, Vector]:
+    def counted(*arguments: Any) -> tuple[int, int]:
         answer = examine_and_guess(*arguments)
         rounds.append(answer[1])
         return answer

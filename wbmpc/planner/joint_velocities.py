@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.jit import kernel
+from wbmpc.jit import kernel, short_kernel
 from wbmpc.planner.settings import WholeBodySettings
 from wbmpc.qp import QpSolution, QuadraticProgram, make_workspace
 from wbmpc.qp.cholesky import add_squares, factor, forward
@@ -48,10 +48,11 @@ class VelocityCost:
     gradient: Vector  # (2,) [cost / (m/s)]
     curvature: Vector  # (2, 2) [cost / (m/s)²]
 
-    def slope(self, velocity: Vector) -> Vector:
-        """Gradient (2,) at `velocity` (2,), were it in the same piece."""
-        slope: Vector = _slope(self.at, self.gradient, self.curvature, velocity)
-        return slope
+    def of_first_jerk(self, unmoved: Vector, gain: float) -> tuple[Vector, Vector]:
+        """Gradient (2,) and curvature (2, 2) at u = 0 of V(unmoved + gain · u), were it all in the same piece."""
+        gradient, curvature = np.empty(2), np.empty((2, 2))
+        _of_first_jerk(self.at, self.gradient, self.curvature, unmoved, gain, gradient, curvature)
+        return gradient, curvature
 
     def error(self, there: VelocityCost) -> float:
         """How far the slope foreseen at another piece's velocity is from the one found there [cost / (m/s)]."""
@@ -107,23 +108,38 @@ class JointVelocities:
         solution = self._workspace.solve(matrices_changed=fresh)
         self._fresh, self.cost = not solution.solved, None
         if solution.solved:
-            slope, self._curvature = _cost(
-                *(solution.x, velocity, jacobian, qp.hessian, qp.x_lower, qp.x_upper, weight),
-                *(fresh, self._free, self._curvature),
+            self.cost = cost = VelocityCost(velocity, np.empty(2), self._curvature.copy())
+            _write_cost(
+                *(cost.gradient, cost.curvature, solution.x, velocity, jacobian, qp.hessian, qp.x_lower, qp.x_upper),
+                *(weight, fresh, self._free),
             )
-            self.cost = VelocityCost(velocity, slope, self._curvature)
+            self._curvature = cost.curvature
         return solution, self.cost
 
 
+@short_kernel
+def _slope(at: Vector, gradient: Vector, curvature: Vector, velocity: Vector, axis: int) -> float:
+    x, y = velocity[0] - at[0], velocity[1] - at[1]
+    slope: float = gradient[axis] + curvature[axis, 0] * x + curvature[axis, 1] * y
+    return slope
+
+
 @kernel
-def _slope(at: Vector, gradient: Vector, curvature: Vector, velocity: Vector) -> Vector:
-    return gradient + curvature @ (velocity - at)
+def _of_first_jerk(
+    at: Vector, gradient: Vector, curvature: Vector, unmoved: Vector, gain: float, slope: Vector, growth: Vector
+) -> None:
+    for axis in range(2):
+        slope[axis] = gain * _slope(at, gradient, curvature, unmoved, axis)
+        for other in range(2):
+            growth[axis, other] = gain * gain * curvature[axis, other]
 
 
 @kernel
 def _error(at: Vector, gradient: Vector, curvature: Vector, velocity: Vector, found: Vector) -> float:
-    foreseen = _slope(at, gradient, curvature, velocity)
-    return max(abs(found[0] - foreseen[0]), abs(found[1] - foreseen[1]))
+    worst = 0.0
+    for axis in range(2):
+        worst = max(worst, abs(found[axis] - _slope(at, gradient, curvature, velocity, axis)))
+    return worst
 
 
 @kernel
@@ -186,7 +202,9 @@ def _write(
 
 
 @kernel
-def _cost(
+def _write_cost(
+    slope: Vector,
+    curvature: Vector,
     x: Vector,
     velocity: Vector,
     jacobian: Vector,
@@ -196,14 +214,15 @@ def _cost(
     weight: float,
     fresh: bool,
     free: NDArray[np.bool_],
-    known: Vector,
-) -> tuple[Vector, Vector]:
+) -> None:
     """Gradient (2,) and curvature (2, 2) of V at the solution x: the joints at their bounds stay there.
 
     ∇V = w (v − J q̇),   ∇²V = w (1 − w J_f H_ff⁻¹ J_fᵀ)   over the joints f that are free. `free` (nv,) is those of the
-    last solve and becomes this one's; the curvature is `known` if they are the same and the matrices not `fresh`.
+    last solve and becomes this one's; the curvature stays if they are the same and the matrices not `fresh`.
     """
-    changed, slope = fresh, velocity.copy()
+    changed = fresh
+    for a in range(2):
+        slope[a] = velocity[a]
     for i in range(len(x)):
         for a in range(2):
             slope[a] -= jacobian[a, i] * x[i]
@@ -213,9 +232,9 @@ def _cost(
     for a in range(2):
         slope[a] *= weight
     if not changed:
-        return slope, known
+        return
     joints = np.flatnonzero(free)
-    count, curvature = len(joints), np.zeros((2, 2))
+    count = len(joints)
     U, follows = np.empty((count, count)), np.empty((2, count))
     for f in range(count):
         for a in range(2):
@@ -226,8 +245,7 @@ def _cost(
     for a in range(2):
         forward(U, follows[a], count)
     for a in range(2):
-        curvature[a, a] = weight
         for b in range(2):
+            curvature[a, b] = weight if a == b else 0.0
             for f in range(count):
                 curvature[a, b] -= weight * weight * follows[a, f] * follows[b, f]
-    return slope, curvature

@@ -94,14 +94,15 @@ class WholeBodyStage:
             if cost is None:
                 return None, answer
         for _ in range(ROUNDS):
+            first_gradient, first_curvature = cost.of_first_jerk(unmoved, gain)
             motion, solution = self._motion.solve(
                 state,
                 zmp=zmp,
                 support=support,
                 com_band=com_band,
                 urgency=urgency,
-                first_gradient=gain * cost.slope(unmoved),
-                first_curvature=gain**2 * cost.curvature,
+                first_gradient=first_gradient,
+                first_curvature=first_curvature,
             )
             if motion is None:
                 return None, solution

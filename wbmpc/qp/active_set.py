@@ -26,8 +26,9 @@ def solve_from_guess(
     active: NDArray[np.int8],
     U: Vector,
     factored: bool,
-) -> tuple[int, Vector]:
-    """Minimise ½ xᵀ H x + gᵀ x + ½ Σ s_i² / d_i within bounds and rows: rounds (0: not found) and x (n,).
+    x: Vector,
+) -> int:
+    """Minimise ½ xᵀ H x + gᵀ x + ½ Σ s_i² / d_i within bounds and rows: rounds (0: not found); `x` (n,) becomes it.
 
     What `active` (n + m,) says, variables first, holds with equality: 1 at the upper bound, -1 at the lower. Whoever is
     violated joins, whoever has a multiplier of the wrong sign leaves, all at once, until nobody does: then all
@@ -45,7 +46,6 @@ def solve_from_guess(
     multipliers solve (Yᵀ Y + D) λ = Yᵀ z − b, z = −U⁻ᵀ g, and x = U⁻¹ (z − Y λ).
     """
     n, m = len(gradient), len(softness)
-    x, nothing = np.empty(n), (0, np.empty(0))
     start, z, free = np.empty(n), np.empty(n), np.empty(n, np.int64)
     rows, value = np.empty(m, np.int64), np.empty(m)
     tried = np.empty((MOST_ROUNDS, n + m), np.int8)
@@ -155,11 +155,11 @@ def solve_from_guess(
             elif value[r] < low - TOLERANCE * (1.0 + abs(low)):
                 active[n + r], changed = -1, True
         if not (changed or refactor):
-            return rounds, x
+            return rounds
         if _is_among(tried[:rounds], active):
             _halve_changes(active, tried[rounds - 1])
     active[:] = 0
-    return nothing
+    return 0
 
 
 @short_kernel
@@ -198,13 +198,14 @@ def examine_and_guess(
     U: Vector,
     factored: bool,
     matrices_changed: bool,
-) -> tuple[int, int, Vector]:
+    x: Vector,
+) -> tuple[int, int]:
     """The data's `soundness`, then what `solve_from_guess` finds, or finds from the empty set; nothing if not SOUND."""
     verdict = soundness(hessian.reshape(-1), gradient, matrix.reshape(-1), all_lower, all_upper, matrices_changed)
     if verdict != SOUND:
-        return verdict, 0, np.empty(0)
+        return verdict, 0
     guessed = active.any()
-    rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active, U, factored)
+    rounds = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active, U, factored, x)
     if rounds == 0 and guessed:
-        rounds, x = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active, U, False)
-    return verdict, rounds, x
+        rounds = solve_from_guess(hessian, gradient, matrix, all_lower, all_upper, softness, active, U, False, x)
+    return verdict, rounds

@@ -61,11 +61,11 @@ class DaqpWorkspace:
     def solve(self, *, matrices_changed: bool = True) -> QpSolution:
         """See `QpWorkspace.solve`."""
         start = perf_counter()
-        problem = self.problem
-        verdict, rounds, x = examine_and_guess(
+        problem, x = self.problem, np.empty(self.problem.variables)
+        verdict, rounds = examine_and_guess(
             *(problem.hessian, problem.gradient, problem.matrix, problem.all_lower, problem.all_upper),
             *(self._softness, self._active, self._factor, self._factored and not matrices_changed),
-            matrices_changed or self._model is None,
+            *(matrices_changed or self._model is None, x),
         )
         self._factored = rounds > 0
         defect = DEFECTS[verdict]
