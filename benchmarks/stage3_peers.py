@@ -12,6 +12,8 @@ count what others do on a shared machine, and count of a peer only what its own 
 from __future__ import annotations
 
 import argparse
+import multiprocessing
+import resource
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
@@ -27,6 +29,7 @@ from wbmpc.planner.contact_choice import ContactChoice
 from wbmpc.planner.contact_force import ContactForce
 from wbmpc.planner.contact_sets import ContactSets
 from wbmpc.planner.knot_forces import KnotForces
+from wbmpc.qp import QuadraticProgram
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES
 
@@ -34,7 +37,9 @@ DOCS = Path(__file__).parents[1] / "docs"
 CANDIDATES, KNOTS = (2, 4, 8, 16, 32, 64), (1, 2, 4, 8, 16)
 RELATIVE, ABSOLUTE = 1e-4, 2e-5  # within which two optima are the same
 BUDGET = 5.0  # [s] after which a peer is asked no more questions of one size
-HOPELESS = 2.0  # [s] median from which a peer is not asked about any larger size
+HOPELESS = 2.0  # [s] median from which a peer is asked a single question of any larger size, in a process of its own
+PATIENCE = 10.0  # [s] of CPU that it gets for it, beside HAND_OVER to take the question in
+HAND_OVER = 5
 REPEATS = 3  # answers of the enumeration to each question, beside each peer's
 
 
@@ -49,6 +54,7 @@ class Times:
     wrong: int = 0  # another optimum, or another opinion on whether there is one
     gave_up: int = 0  # out of time, or failed
     refused: str = ""  # why it was not asked
+    beyond: float = 0.0  # [s] of CPU in which a single question was not answered
 
 
 Size = tuple[int, int]  # candidates, knots
@@ -68,17 +74,14 @@ class Meeting:
         own = ContactSets(candidates, SETTINGS, mass=MASS, knots=knots)
         self.own[size], self.impossible[size] = Times(), 0
         for name in SOLVERS:
-            self.peers[name][size] = Times(refused="too slow" if self._hopeless(name, size) else "")
+            self.peers[name][size] = Times()
         asked = [ask(seed, options=candidates, knots=knots) for seed in range(questions)]
         for question in asked:
             own.solve(question.need, question.options, left=LEFTWARDS)
-        if all(self.peers[name][size].refused for name in SOLVERS):
-            for question in asked:
-                self._ask_own(own, question, size)
-            return
         choice = ContactChoice(candidates, SETTINGS, mass=MASS, backend="daqp", knots=knots)
         scaled = ScaledProblem(choice)
-        solvers = {name: make(scaled.problem) for name, make in SOLVERS.items() if not self.peers[name][size].refused}
+        hopeless = [name for name in SOLVERS if self._hopeless(name, size)]
+        solvers = {name: make(scaled.problem) for name, make in SOLVERS.items() if name not in hopeless}
         for question in asked:
             choice.pose(question.need, question.options, left=LEFTWARDS)
             scaled.refresh()
@@ -87,14 +90,37 @@ class Meeting:
             for name, solver in solvers.items():
                 self._ask_peer(solver, self.peers[name][size], optimum)
                 self._ask_own(own, question, size)
+        for name in hopeless:  # the last question is still in the arrays
+            self._ask_once(name, scaled.problem, self.peers[name][size], optimum)
 
     def _hopeless(self, name: str, size: Size) -> bool:
-        """Whether the peer was too slow, or given up on, at a smaller size."""
+        """Whether the peer was too slow at a smaller size."""
         smaller = [(size[0] // 2, size[1]), (size[0], size[1] // 2)]
         known = [self.peers[name][other] for other in smaller if other in self.peers[name]]
-        return any(
-            times.refused == "too slow" or (times.total and np.median(times.total) > HOPELESS) for times in known
-        )
+        return any(times.beyond or (times.total and np.median(times.total) > HOPELESS) for times in known)
+
+    def _ask_once(self, name: str, problem: QuadraticProgram, times: Times, optimum: float) -> None:
+        """One question to a peer that may take for ever: in a child that the system ends with its CPU time."""
+
+        def answer(pipe: Any) -> None:
+            limit = int(PATIENCE) + HAND_OVER
+            resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+            found = Times()
+            self._ask_peer(SOLVERS[name](problem), found, optimum)
+            pipe.send(found)
+
+        context = multiprocessing.get_context("fork")
+        here, there = context.Pipe(duplex=False)
+        child = context.Process(target=answer, args=(there,))
+        child.start()
+        there.close()
+        try:
+            found: Times = here.recv()
+        except EOFError:  # its time was up
+            found = Times(gave_up=1)
+        child.join()
+        found.beyond = PATIENCE if found.gave_up else 0.0
+        vars(times).update(vars(found))
 
     def _ask_own(self, own: ContactSets, question: Question, size: Size) -> float:
         for _ in range(REPEATS):

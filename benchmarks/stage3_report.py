@@ -44,6 +44,8 @@ def forces_table(seconds: dict[int, tuple[list[float], list[float]]]) -> list[st
 
 def _cell(times: Times, reference: float) -> str:
     """Median (99 %) of the wall clock and the ratio of CPU times; what went wrong."""
+    if times.beyond:
+        return f"> {1e3 * times.beyond:.3g} **> {times.beyond / reference:.0f} ×**"
     if not times.total:
         return times.refused
     notes = [f"{count} {word}" for count, word in ((times.wrong, "wrong"), (times.gave_up, "gave up")) if count]
