@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,7 @@ from wbmpc.planner.support import SupportPolygon, foot_corners
 from wbmpc.signals import Vector
 
 
-@dataclass(frozen=True, slots=True)
-class Transfer:
+class Transfer(NamedTuple):
     """The load goes from foot to foot: shares of left and right go linearly from `before` to `after`."""
 
     begin: float  # [s from now]
@@ -29,8 +28,7 @@ class Transfer:
         return cls(end - step.double_support, before, shares[1 - step.side])
 
 
-@dataclass(frozen=True, slots=True)
-class Interval:
+class Interval(NamedTuple):
     """Until `end` the robot stands on `feet`, but for a foot that swings.
 
     In a double support between two walking steps the ZMP may be in w_L P_L ⊕ w_R P_R, a sole that slides from one foot
