@@ -51,9 +51,9 @@ def linearise(
     q: Vector,
     limits: Vector,
     wanted: Wanted,
-) -> tuple[Vector, Vector, Vector]:
+) -> tuple[Vector, Vector, Vector, Vector]:
     """Jacobian (24, nv) and velocity (24,) of CoM, hands, torso and feet, in these rows; then (3, nv) the
-    posture's velocity and the bounds on q̇.
+    posture's velocity and the bounds on q̇; then (5, 3) where the palms are, and the torso's rotation.
 
     Args:
         pin: Pinocchio's views at q: J (6, nv), J_com (3, nv), CoM, positions of soles and palms, rotations (3, 3) of
@@ -112,4 +112,6 @@ def linearise(
         posture_velocity[6 + i] = pulls.posture * (wanted.posture[i] - angle)
         lower[6 + i] = min(max((limits[0, i] - angle) / LIMIT_TIME, -speed), 0.0)
         upper[6 + i] = min(max((limits[1, i] - angle) / LIMIT_TIME, 0.0), speed)
-    return jacobian, velocity, joints
+    frames = np.empty((5, 3))
+    frames[0], frames[1], frames[2:] = positions[2], positions[3], torso
+    return jacobian, velocity, joints, frames

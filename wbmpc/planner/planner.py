@@ -117,7 +117,7 @@ class Planner:
         hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
-            *references.attitude(contacts, float(soles.yaws.mean())),
+            *references.attitude(contacts, soles.heading),
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
