@@ -117,7 +117,7 @@ def com_course(now: Vector, motion: Motion | None, height: HeightPlan) -> tuple[
     else:
         jerk, com, velocity, acceleration = motion.jerk, motion.com, motion.velocity, motion.acceleration
     states, jerks = join_courses(
-        *(now, jerk, com, velocity, acceleration),
+        *(np.ascontiguousarray(now), jerk, com, velocity, acceleration),
         *(height.jerk, height.height, height.velocity, height.acceleration),
     )
     return states, jerks
