@@ -283,7 +283,7 @@ class Planner:
     @property
     def _course(self) -> Vector:
         """(N, 3) [m] where the CoM will be: the last plan's."""
-        if self._last is None or not np.isfinite(self._last.report.com).all():
+        if self._last is None or not np.isfinite(self._last.report.com[-1, 0]):  # without an answer of stage 2
             return np.tile(self._com.value[:, 0], (self._preview.steps, 1))
         return self._last.report.com
 

@@ -46,6 +46,7 @@ class References:
     def __init__(self, robot: Robot, tasks: Tasks, *, q: Vector, height: float, times: Vector) -> None:
         """Start with the posture `q` (nq,) and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
         self._tasks, self._times, self._nominal_height = tasks, times, height
+        self._free_palms = np.full((len(SIDES), len(times), 3), np.nan)
         kinematics = Kinematics(robot)
         self._stand = Posture(kinematics, nominal=q, com_cost=COM_COST)
         self._reach_goal = Posture(kinematics, nominal=q, com_cost=COM_COST)
@@ -115,7 +116,7 @@ class References:
     def _paths(self, time: float, *, pace: float | None = None) -> Paths:
         """Of the tasks; `pace` of all their clocks, 0 … 1; None: each at its own gate's."""
         times = self._times
-        palms, sigma = np.full((len(SIDES), len(times), 3), np.nan), np.zeros(len(times))
+        palms, sigma = self._free_palms.copy(), np.zeros(len(times))
         for task in self._tasks.current:
             sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
             sigma = np.maximum(sigma, sigmas)
