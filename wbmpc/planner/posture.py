@@ -62,7 +62,7 @@ class Posture:
         self._step = np.inf  # [rad, m] largest change of the last iteration
         self._left = PATIENCE
         frames = (*robot.sole_frames, *robot.palm_frames, *robot.elbow_frames, robot.torso_frame)
-        self._views = self._kinematics.views(frames[:6], (*robot.sole_frames, robot.torso_frame))
+        self._views, self._frames = self._kinematics.views, np.array(frames)
         self._chains = chains_of(robot.pin_model, frames)
         self._look()
         self._told = Targets(
@@ -122,7 +122,7 @@ class Posture:
             self._left -= 1
             self._kinematics.update_kinematics(self.q)
             posture_step(
-                *(self._views, *self._chains, told, self._com_cost, self.tilt_cost),
+                *(self._views, self._frames, *self._chains, told, self._com_cost, self.tilt_cost),
                 *(self.q, self._nominal, self._lower, self._upper, self._delta, self._found),
             )
             self.q = robot.integrate(self.q, self._delta)
@@ -137,9 +137,8 @@ class Posture:
 
     def _look(self) -> None:
         """Copy what others may ask of the configuration that Pinocchio has just computed."""
-        _, _, _, places, rotations = self._views
-        self._places = np.array(places)  # (6, 3) [m] soles, palms, elbows
-        self.torso = rotations[2].copy()  # (3, 3) torso to world
+        self._places = self._views[3][self._frames[:6], 3]  # (6, 3) [m] soles, palms, elbows
+        self.torso = self._kinematics.rotation(self._robot.torso_frame)  # (3, 3) torso to world
         self.torso_heading = heading_of(self.torso)  # [rad]
 
     def _start(self, soles: Vector, yaws: Vector) -> Vector:
