@@ -149,11 +149,11 @@ class HandContact:
 
     def caps(self, times: Vector) -> Vector:
         """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
-        if not self.touching or self.patch is None:
+        if self.patch is None:
             return np.zeros(len(times))
         unloading = self.phase == ContactPhase.UNLOADED
         slope = -1.0 / self._settings.ramp_time if unloading else 1.0 / self._pace.ramp_time
-        return ramp(self.patch.force_cap, self._level, slope, times)
+        return ramp(self.patch.force_cap if self.touching else 0.0, self._level, slope, times)
 
     # ------------------------------------------------------------------ the life
 
