@@ -25,6 +25,12 @@ def chains_of(model: pin.Model, frames: tuple[int, ...]) -> tuple[NDArray[np.int
 
 
 @short_kernel
+def rotation_of(poses, frame):  # type: ignore[no-untyped-def]
+    """Rotation (3, 3) of a frame to world out of `Kinematics.views`' poses."""
+    return poses[frame, :3].T
+
+
+@short_kernel
 def frame_twists(J, v, chains, lengths, positions, twist):  # type: ignore[no-untyped-def]
     """Write the twists (frames, 6) at the frames' origins in world axes; see `frame_terms`."""
     for f in range(lengths.size):

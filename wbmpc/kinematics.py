@@ -40,19 +40,20 @@ class Kinematics:
         pin.updateFramePlacements(self._model, self._data)
         self._has_velocity = False
 
-    def views(
-        self, positions: tuple[int, ...], rotations: tuple[int, ...]
-    ) -> tuple[Vector, Vector, Vector, tuple[Vector, ...], tuple[Vector, ...]]:
+    @property
+    def views(self) -> tuple[Vector, Vector, Vector, Vector]:
         """Where Pinocchio keeps them, for kernels: read after any update, and never written.
 
-        Joint screws about the world's origin (6, nv), the CoM's Jacobian (3, nv) and place (3,), and the `positions`
-        (3,) and `rotations` (3, 3) of frames. A `pin.Data` never moves its memory.
+        Joint screws about the world's origin (6, nv), the CoM's Jacobian (3, nv) and place (3,), and the poses of all
+        frames (frames, 4, 3): the columns of a frame's rotation to world, then its origin. A `pin.Data` never moves its
+        memory.
         """
         data = self._data
-        return (
-            *(data.J, data.Jcom, data.com[0]),
-            *(tuple(data.oMf[f].translation for f in positions), tuple(data.oMf[f].rotation for f in rotations)),
-        )
+        first, last, count = data.oMf[0].rotation, data.oMf[len(data.oMf) - 1].translation, len(data.oMf)
+        poses = np.lib.stride_tricks.as_strided(first, (count, 4, 3), (96, 24, 8))
+        if poses[-1, 3].ctypes.data != last.ctypes.data:
+            raise RuntimeError("this Pinocchio keeps the poses of frames in another order than expected")
+        return data.J, data.Jcom, data.com[0], poses
 
     def position(self, frame: int) -> Vector:
         """Origin (3,) of the frame in world [m]."""

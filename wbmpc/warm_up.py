@@ -18,12 +18,15 @@ from wbmpc.scenario.validate import validate
 
 PATIENCE = 5.0  # [s] before a word is said; code that is cached is there sooner
 BRIEF = 0.021  # [s] three plans
-EVERYTHING = {  # a contact is needed and chosen in the first plan
+EVERYTHING = {  # a contact is needed and chosen in the first plan, a step asked for in the third
     "name": "warm_up",
     "duration": 5.0,
     "world": {"objects": {"table": {"kind": "box", "size": [0.20, 0.60, 0.20], "position": [0.30, 0.0]}}},
     "patches": {"table": {"on": "table", "face": "top", "offset": [-0.06, -0.11]}},
-    "tasks": [{"kind": "reach", "target": [0.44, 0.05, 0.30], "start": 0.0, "arrive_by": 1.0, "hold": 0.5}],
+    "tasks": [
+        {"kind": "reach", "target": [0.44, 0.05, 0.30], "start": 0.0, "arrive_by": 1.0, "hold": 0.5},
+        {"kind": "walk", "commands": [{"time": 0.02, "velocity": [0.01, 0.0]}]},
+    ],
     "checks": [{"kind": "upright_at_end"}],
 }
 

@@ -15,7 +15,7 @@ from wbmpc.qp import QpSolution
 from wbmpc.rotations import UP
 from wbmpc.signals import SIDES, HandMode, PlanReport, StageReport, Vector
 
-FRICTION = 0.5  # of a hand without a patch: nobody asks
+NORMALS, FRICTIONS = np.array([UP] * len(SIDES)), np.full(len(SIDES), 0.5)  # of hands without a patch: nobody asks
 
 
 def assemble(
@@ -46,7 +46,7 @@ def assemble(
     """
     palm_position, palm_velocity = joints.palms(velocity)
     palm_acceleration, palm_jerk = np.zeros((len(SIDES), 3)), np.zeros((len(SIDES), 3))
-    urgency, friction, normal = np.zeros(len(SIDES)), np.full(len(SIDES), FRICTION), np.array([UP] * len(SIDES))
+    urgency, friction, normal = np.zeros(len(SIDES)), FRICTIONS.copy(), NORMALS.copy()
     caps, top, ends = np.zeros((len(SIDES), 2)), np.zeros(len(SIDES)), np.array([0.0, period])
     for side, contact in enumerate(contacts):
         patch, hurried = contact.patch, contact.hurried

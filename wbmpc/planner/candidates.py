@@ -17,7 +17,7 @@ from wbmpc.planner.posture import PalmTarget, Posture
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.support import SupportPolygon
 from wbmpc.robot import Robot
-from wbmpc.rotations import length
+from wbmpc.rotations import length, plane_rotation
 from wbmpc.scenario import PatchPose
 from wbmpc.signals import SIDES, CandidateReport, SolveStatus, StageReport, Vector
 
@@ -83,6 +83,7 @@ class Candidates:
         self._places = {(c.patch.name, c.hand): c for c in self.all}
         self._turn = -1
         self._stand: tuple[bytes, ...] = ()  # where the feet were at the last refresh
+        self._at_rest: list[Candidate] | None = None  # those used, when with them all that could be done is done
         self._left = np.array([0.0, 1.0])  # unit, to the robot's left
         self._slots = min(len(self.all), settings.most_candidates)
         room = max(self._slots, len(SIDES))  # for contacts that are held, however few candidates are considered
@@ -102,21 +103,23 @@ class Candidates:
         if not self.all:
             return
         stand = (soles.tobytes(), yaws.tobytes(), centre.tobytes())
+        if stand == self._stand and self._at_rest == used:
+            return
+        self._at_rest = None
         if stand != self._stand:
             self._stand = stand
             for candidate in self.all:
                 candidate.current = False
-            heading = float(np.mean(yaws))
-            self._left = np.array([-np.sin(heading), np.cos(heading)])
+            self._left = plane_rotation(float(np.mean(yaws)))[:, 1].copy()
         turn = self.all if everyone else used
         if not everyone and (following := self._following()) not in used:
             turn = [*used, following]
         for candidate in turn:
-            palms: list[PalmTarget | None] = [None, None]
-            palms[candidate.hand] = candidate.target
+            palms = [candidate.target if hand == candidate.hand else None for hand in range(len(SIDES))]
             count = iterations if candidate.settled else max(iterations, SEARCH_ITERATIONS)
             candidate.posture.iterate(count, soles=soles, yaws=yaws, palms=palms, centre=centre)
             candidate.current = True
+        self._at_rest = used if self.settled and all(candidate.posture.finished for candidate in turn) else None
 
     def of(self, patch: PatchPose | None, hand: int) -> Candidate:
         """The candidate of a hand on a patch."""
@@ -132,10 +135,10 @@ class Candidates:
     @property
     def settled(self) -> bool:
         """Whether all postures say if their candidate is in reach, from where the feet are."""
-        return all(candidate.settled for candidate in self.all)
+        return self._at_rest is not None or all(candidate.settled for candidate in self.all)
 
     def _following(self) -> Candidate:
-        """The next candidate whose posture is not settled yet, or just the next."""
+        """The next candidate whose posture is not settled yet, or the same again."""
         for _ in self.all:
             self._turn = (self._turn + 1) % len(self.all)
             if not self.all[self._turn].settled:

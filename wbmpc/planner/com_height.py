@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from wbmpc.jit import kernel
@@ -24,17 +22,6 @@ class HeightPlan:
     acceleration: Vector  # [m/s²]
 
 
-class Course(NamedTuple):
-    """Those matrices of `Preview` that are used here."""
-
-    P_ps: Vector
-    P_vs: Vector
-    P_as: Vector
-    P_pu: Vector
-    P_vu: Vector
-    P_au: Vector
-
-
 class ComHeightStage:
     """minimise  w_j |U|² + w_v |Ċ|² + w_p |C − C_wanted|²  over the vertical jerks U (N,)
 
@@ -50,7 +37,8 @@ class ComHeightStage:
     def __init__(self, preview: Preview, settings: HeightSettings, *, backend: str) -> None:
         n = preview.steps
         self._steps = n
-        self._course = Course(preview.P_ps, preview.P_vs, preview.P_as, preview.P_pu, preview.P_vu, preview.P_au)
+        self._of_state = np.array([preview.P_ps, preview.P_vs, preview.P_as])  # (3, N, 3)
+        self._of_jerks = np.array([preview.P_pu, preview.P_vu, preview.P_au])  # (3, N, N)
         self._settings = settings
         weights = np.concatenate([np.full(n, settings.limit_slack_cost), np.full(n, settings.band_slack_cost)])
         self.problem = QuadraticProgram(n, 2 * n, soft_weight=weights)
@@ -94,7 +82,7 @@ class ComHeightStage:
         """
         settings, qp, state = self._settings, self.problem, np.ascontiguousarray(state)
         _write(
-            *(qp.gradient, qp.lower, qp.upper, self._course, state, wanted, *limits, band),
+            *(qp.gradient, qp.lower, qp.upper, self._of_state, self._of_jerks, state, wanted, *limits, band),
             *(settings.velocity_cost, settings.position_cost, settings.middle_share),
         )
         solution = self._workspace.solve(matrices_changed=self._fresh)
@@ -102,7 +90,7 @@ class ComHeightStage:
         if solution.status != SolveStatus.SOLVED:
             return None, solution
         jerk = solution.x.copy()
-        return HeightPlan(jerk, *_read(self._course, state, jerk)), solution
+        return HeightPlan(jerk, *_read(self._of_state, self._of_jerks, state, jerk)), solution
 
 
 @kernel
@@ -110,7 +98,8 @@ def _write(
     gradient: Vector,
     lower: Vector,
     upper: Vector,
-    course: Course,
+    of_state: Vector,
+    of_jerks: Vector,
     state: Vector,
     wanted: Vector,
     lowest: float,
@@ -120,9 +109,12 @@ def _write(
     position_cost: float,
     middle_share: float,
 ) -> None:
-    """Gradient (N,) and bounds (2 N,) of the problem; where two end-effectors disagree, the compromise between them."""
+    """Gradient (N,) and bounds (2 N,) of the problem; where two end-effectors disagree, the compromise between them.
+
+    `of_state` (3, N, 3), `of_jerks` (3, N, N): the matrices of `Preview` for position, velocity and acceleration.
+    """
     n = len(gradient)
-    drift, error = course.P_ps @ state, np.empty(n)
+    drift, error = of_state[0] @ state, np.empty(n)
     share = middle_share if np.isfinite(band).all() else 0.0
     for k in range(n):
         low, high = band[k]
@@ -131,16 +123,16 @@ def _write(
             low = high = 0.5 * (low + high)
         lower[k], upper[k] = lowest - drift[k], highest - drift[k]
         lower[n + k], upper[n + k] = low - drift[k], high - drift[k]
-    slope, pull = course.P_vu.T @ (course.P_vs @ state), course.P_pu.T @ error
+    slope, pull = of_jerks[1].T @ (of_state[1] @ state), of_jerks[0].T @ error
     for k in range(n):
         gradient[k] = velocity_cost * slope[k] + position_cost * pull[k]
 
 
 @kernel
-def _read(course: Course, state: Vector, jerk: Vector) -> tuple[Vector, Vector, Vector]:
+def _read(of_state: Vector, of_jerks: Vector, state: Vector, jerk: Vector) -> tuple[Vector, Vector, Vector]:
     """Height, velocity and acceleration (N,) under the jerks (N,)."""
     return (
-        course.P_ps @ state + course.P_pu @ jerk,
-        course.P_vs @ state + course.P_vu @ jerk,
-        course.P_as @ state + course.P_au @ jerk,
+        of_state[0] @ state + of_jerks[0] @ jerk,
+        of_state[1] @ state + of_jerks[1] @ jerk,
+        of_state[2] @ state + of_jerks[2] @ jerk,
     )

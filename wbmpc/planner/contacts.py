@@ -61,6 +61,7 @@ class Contacts:
         self._hopeless = 0.0  # [s] that no candidate has been able to help
         self._since_review = RETRY_PLANS
         self._waited = 0.0  # [s] for the candidates' postures
+        self.used: list[Candidate] = []  # the candidates that the hands have taken, those being given up left out
         self._palm_velocities = np.zeros((len(SIDES), 3))  # [m/s] measured at the last plan
         self._urgency = 0.0  # 0 … 1, at the last plan
 
@@ -99,13 +100,11 @@ class Contacts:
     @property
     def posture(self) -> Posture | None:
         """The posture that has every hand with a contact on its patch and the CoM over the feet; None without one."""
-        used = self._used
+        used = self.used
         return used[0].posture if len(used) == 1 else self._together if used else None
 
-    @property
-    def _used(self) -> list[Candidate]:
-        """The candidates that the hands have taken, those being given up left out."""
-        return [self.candidates.of(c.patch, c.side) for c in self.hands if c.has_goal]
+    def _look_at_hands(self) -> None:
+        self.used = [self.candidates.of(c.patch, c.side) for c in self.hands if c.has_goal]
 
     # ------------------------------------------------------------------ one plan
 
@@ -119,9 +118,9 @@ class Contacts:
             centre: (2,) where the CoM should rather be [m].
         """
         self.candidates.refresh(
-            soles=soles, yaws=yaws, centre=centre, iterations=iterations, used=self._used, everyone=everyone
+            soles=soles, yaws=yaws, centre=centre, iterations=iterations, used=self.used, everyone=everyone
         )
-        if all(c.has_goal for c in self.hands):
+        if len(self.used) == len(SIDES):
             palms = [c.target for c in self.hands]
             self._together.iterate(iterations, soles=soles, yaws=yaws, palms=palms, centre=centre)
 
@@ -162,6 +161,7 @@ class Contacts:
                 contact.release(palm=palms[side], home=homes[side])
             if contact.phase != before:
                 events.append(f"contact {SIDES[side]} {patch}: {before.name.lower()} -> {contact.phase.name.lower()}")
+        self._look_at_hands()
 
     def plan(
         self,
@@ -276,6 +276,7 @@ class Contacts:
                 winner.patch, palm=palms[winner.hand], palm_velocity=self._palm_velocities[winner.hand]
             )
             self._hopeless, self._short = 0.0, False
+        self._look_at_hands()
         return firing, stage
 
     def _plan_forces(self, need: Need) -> StageReport:

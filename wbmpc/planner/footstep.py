@@ -45,6 +45,12 @@ class SoleReferences:
     yaw_rates: Vector  # (2,) [rad/s]
     accelerations: Vector  # (2, 3) [m/s²]
 
+    @property
+    def heading(self) -> float:
+        """[rad] between the two."""
+        left, right = self.yaws.tolist()
+        return 0.5 * (left + right)
+
 
 @record
 class Feet:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from wbmpc.planner.hand_path import HandPath
-from wbmpc.planner.pace import Pace
+from wbmpc.planner.pace import Pace, ramp
 from wbmpc.planner.posture import PalmTarget
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.planner.urgent_approach import UrgentApproach
@@ -39,8 +39,9 @@ class HandContact:
         self._descent = -1.0  # [m] how far the descent has come; negative: still on the way to the clearance point
         self._path: HandPath | None = None
         self._sigma, self._duration, self._rate = 0.0, 1.0, 1.0
-        self._touched = np.zeros(3)
+        self._rest, self._touched = np.zeros(3), np.zeros(3)  # [m] palm on the patch: where it should be, where it is
         self._palm = np.zeros(3)  # [m] measured at the last plan
+        self._gripped: tuple[Vector, PatchPose, PatchPose] | None = None  # palm, patch and the grip of both
         self._unloaded_clock = 0.0
         self._urgency = 0.0  # 0 … 1, now
         self._pace = Pace.of(settings, 0.0)  # of the present approach
@@ -90,7 +91,7 @@ class HandContact:
         """Palm position (3,) of the contact in world [m]; None when there is none to reach or hold."""
         if self.patch is None or not self.has_goal:
             return None
-        return self._touched if self.touching else self.patch.position + self._radius * self.patch.normal
+        return self._touched if self.touching else self._rest
 
     @property
     def target(self) -> PalmTarget | None:
@@ -105,9 +106,13 @@ class HandContact:
         That is the patch's centre until the palm touches, and from then on where the palm, a sphere, is measured to
         touch; None without a contact.
         """
-        if self.patch is None or not self.touching:
-            return self.patch
-        return replace(self.patch, position=self._palm - self._radius * self.patch.normal)
+        palm, patch, gripped = self._palm, self.patch, self._gripped
+        if patch is None or not self.touching:
+            return patch
+        if gripped is None or gripped[0] is not palm or gripped[1] is not patch:
+            grip = replace(patch, position=palm - self._radius * patch.normal)
+            gripped = self._gripped = palm, patch, grip
+        return gripped[2]
 
     def reference(self) -> tuple[Vector, Vector, Vector]:
         """Palm position, velocity and acceleration (3,) to follow now; only when busy."""
@@ -144,17 +149,17 @@ class HandContact:
 
     def caps(self, times: Vector) -> Vector:
         """Bound on the normal force [N] at `times` (n,) seconds from now, ramps included."""
-        if not self.touching or self.patch is None:
+        if self.patch is None:
             return np.zeros(len(times))
         unloading = self.phase == ContactPhase.UNLOADED
         slope = -1.0 / self._settings.ramp_time if unloading else 1.0 / self._pace.ramp_time
-        return self.patch.force_cap * np.minimum(np.maximum(self._level + slope * times, 0.0), 1.0)
+        return ramp(self.patch.force_cap if self.touching else 0.0, self._level, slope, times)
 
     # ------------------------------------------------------------------ the life
 
     def choose(self, patch: PatchPose, *, palm: Vector, palm_velocity: Vector) -> None:
         """Stage 3 has chosen `patch`; the palm is at `palm` (3,) [m] and moves with `palm_velocity` (3,) [m/s]."""
-        self.patch = patch
+        self.patch, self._rest = patch, patch.position + self._radius * patch.normal
         pace = self._pace = Pace.of(self._settings, self._urgency)
         clearance = patch.position + (self._radius + pace.clearance) * patch.normal
         self._path = HandPath(start=palm.copy(), end=clearance, away=patch.normal)

@@ -29,20 +29,21 @@ class JointReference:
         self._robot, self._settings = robot, settings
         self._kinematics = Kinematics(robot)
         frames = (*robot.sole_frames, *robot.palm_frames, robot.torso_frame)
-        self._views = self._kinematics.views(frames[:4], (*robot.sole_frames, robot.torso_frame))
+        self._views, self._frames = self._kinematics.views, np.array(frames)
         self._chains = chains_of(robot.pin_model, frames)
         self._pulls = Pulls(settings.tracking_rate, settings.torso_rate, settings.posture_rate)
         self._limits = np.array([robot.joint_lower, robot.joint_upper, SPEED_SHARE * robot.joint_speed])
         self._weights = {(left, right): self._weight((left, right)) for left, right in product((False, True), repeat=2)}
         self._palms, self._palm_velocities = np.zeros((2, 3)), np.zeros((2, 3))  # of the references
         self._palm_jacobian, self._torso_jacobian = np.zeros((6, robot.nv)), np.zeros((3, robot.nv))
+        self._poses = np.zeros((5, 3))  # [m] palms; the torso's rotation
         self.q = q.copy()  # (nq,)
         self._kinematics.update_kinematics(self.q)
 
     @property
     def torso_rotation(self) -> Vector:
         """(3, 3) torso to world, where `tasks` looked last."""
-        return np.array(self._views[4][2], order="C")
+        return self._poses[2:]
 
     def torso_velocity(self, velocity: Vector) -> Vector:
         """Angular velocity (3,) of the torso in world for joint velocities (nv,) [rad/s], where `tasks` looked last."""
@@ -54,7 +55,7 @@ class JointReference:
         The tracker follows these and not the task's own path: stage 2 has already weighed the palm against the CoM, so
         that a target beyond reach never pulls the robot off its balance.
         """
-        return np.array(self._views[3][2:]), (self._palm_jacobian @ velocity).reshape(2, 3)
+        return self._poses[:2].copy(), (self._palm_jacobian @ velocity).reshape(2, 3)
 
     def advance(self, velocity: Vector, dt: float) -> None:
         """Integrate q̇ (nv,) over dt [s]."""
@@ -103,7 +104,9 @@ class JointReference:
             torso_up=torso_up,
             torso_heading=torso_heading,
         )
-        J, velocity, joints = linearise(self._views, *self._chains, self._pulls, self.q, self._limits, wanted)
+        J, velocity, joints, self._poses = linearise(
+            *(self._views, self._frames, *self._chains, self._pulls, self.q, self._limits, wanted)
+        )
         self._palm_jacobian, self._torso_jacobian = J[HANDS], J[TORSO]
         return VelocityTasks(
             com_jacobian=J[COM],

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.frame_terms import frame_rows, turn_to_level
+from wbmpc.frame_terms import frame_rows, rotation_of, turn_to_level
 from wbmpc.jit import kernel
 from wbmpc.signals import Vector
 
@@ -45,23 +45,23 @@ class Wanted(NamedTuple):
 @kernel
 def linearise(
     pin: Any,
+    frames: NDArray[np.int64],
     chains: NDArray[np.int64],
     lengths: NDArray[np.int64],
     pulls: Pulls,
     q: Vector,
     limits: Vector,
     wanted: Wanted,
-) -> tuple[Vector, Vector, Vector]:
+) -> tuple[Vector, Vector, Vector, Vector]:
     """Jacobian (24, nv) and velocity (24,) of CoM, hands, torso and feet, in these rows; then (3, nv) the
-    posture's velocity and the bounds on q̇.
+    posture's velocity and the bounds on q̇; then (5, 3) where the palms are, and the torso's rotation.
 
     Args:
-        pin: Pinocchio's views at q: J (6, nv), J_com (3, nv), CoM, positions of soles and palms, rotations (3, 3) of
-            both soles and torso.
-        chains, lengths: of soles, palms and torso, see `chains_of`.
+        pin: Pinocchio's views at q, see `Kinematics`.
+        frames, chains, lengths: of soles, palms and torso, see `chains_of`.
         limits: (3, nj) lowest and highest angle [rad], largest speed [rad/s].
     """
-    J, com_jacobian, com, positions, rotations = pin
+    J, com_jacobian, com, poses = pin
     nj = len(wanted.posture)
     nv = nj + 6
     jacobian, velocity = np.zeros((24, nv)), np.zeros(24)
@@ -80,14 +80,15 @@ def linearise(
         com_velocity[i] = pulls.tracking * (wanted.com[i] - com[i])
     for side in range(2):
         first = 6 * side
-        frame_rows(J, chains[side], lengths[side], positions[side], foot_J[first : first + 6])
-        turn_to_level(wanted.sole_yaws[side], rotations[side], turn)
+        sole, palm = poses[frames[side], 3], poses[frames[2 + side], 3]
+        frame_rows(J, chains[side], lengths[side], sole, foot_J[first : first + 6])
+        turn_to_level(wanted.sole_yaws[side], rotation_of(poses, frames[side]), turn)
         for i in range(3):
-            error = wanted.soles[side, i] - positions[side][i]
+            error = wanted.soles[side, i] - sole[i]
             foot_velocity[first + i] = wanted.sole_velocities[side, i] + pulls.tracking * error
             foot_velocity[first + 3 + i] = pulls.tracking * turn[i]
         foot_velocity[first + 5] += wanted.sole_yaw_rates[side]
-        first, palm = 3 * side, positions[2 + side]
+        first = 3 * side
         frame_rows(J, chains[2 + side], lengths[2 + side], palm, hand_J[first : first + 3])
         if wanted.active[side] > 0.0:
             square = 0.0
@@ -97,7 +98,7 @@ def linearise(
             for i in range(3):
                 error = wanted.palms[side, i] - palm[i]
                 hand_velocity[first + i] = wanted.palm_velocities[side, i] + share * error
-    torso, up = rotations[2], wanted.torso_up
+    torso, up = rotation_of(poses, frames[4]), wanted.torso_up
     for c in range(lengths[4]):
         for i in range(3):
             torso_J[i, chains[4, c]] = J[3 + i, chains[4, c]]
@@ -112,4 +113,6 @@ def linearise(
         posture_velocity[6 + i] = pulls.posture * (wanted.posture[i] - angle)
         lower[6 + i] = min(max((limits[0, i] - angle) / LIMIT_TIME, -speed), 0.0)
         upper[6 + i] = min(max((limits[1, i] - angle) / LIMIT_TIME, 0.0), speed)
-    return jacobian, velocity, joints
+    found = np.empty((5, 3))
+    found[0], found[1], found[2:] = poses[frames[2], 3], poses[frames[3], 3], torso
+    return jacobian, velocity, joints, found

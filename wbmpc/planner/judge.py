@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,9 +14,10 @@ from wbmpc.planner.gait import Gait
 from wbmpc.planner.horizontal_motion import Motion, ZmpModel
 from wbmpc.planner.references import Paths, References
 from wbmpc.planner.settings import PlannerSettings
+from wbmpc.planner.support import SupportPolygon
 from wbmpc.planner.support_preview import SupportPreview
 from wbmpc.planner.tasks import Tasks
-from wbmpc.planner.zmp_model import need_at_rest, need_of
+from wbmpc.planner.zmp_model import need_at_rest, need_of, shift_to_rest
 from wbmpc.record import record
 from wbmpc.signals import Firing, StageReport, Vector
 
@@ -29,6 +31,14 @@ class Judgement:
     stage3: StageReport = NOT_RUN
 
 
+class _End(NamedTuple):
+    """Where a task ends."""
+
+    com: Vector  # (3,) [m]
+    polygon: SupportPolygon
+    shift: Vector  # (2,) [m] see `shift_to_rest`
+
+
 class Judge:
     """Asks stage 2 what the tasks would need if nothing held them up, and leaves the rest to the contacts."""
 
@@ -37,6 +47,7 @@ class Judge:
     ) -> None:
         self._settings, self._margin = settings, settings.whole_body.zmp_margin
         self._gait, self._references, self._contacts, self._tasks = gait, references, contacts, tasks
+        self._end: _End | None = None  # as last looked at
 
     def judge(
         self,
@@ -92,4 +103,9 @@ class Judge:
     def _goal_need(self, mass: float) -> Need | None:
         """The need where the current task ends, on the feet that will carry it; None without such a task."""
         com = self._references.goal_com
-        return None if com is None else need_at_rest(com, polygon=self._gait.goal_polygon(self._margin), mass=mass)
+        if com is None:
+            return None
+        polygon, end = self._gait.goal_polygon(self._margin), self._end
+        if end is None or end.com is not com or end.polygon is not polygon:
+            end = self._end = _End(com, polygon, shift_to_rest(com, polygon))
+        return need_at_rest(com, polygon=polygon, shift=end.shift, mass=mass)

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from wbmpc.jit import kernel
 from wbmpc.planner.settings import ContactSettings
 from wbmpc.record import record
+from wbmpc.signals import Vector
 
 ARRIVED, ROUGHLY_ARRIVED = 0.012, 0.05  # [m] palm error at the clearance point below which the descent begins
 
@@ -18,6 +22,15 @@ def hurried(urgency: float) -> bool:
 def way_time(settings: ContactSettings, distance: float) -> float:
     """Time [s] that such a hand needs for `distance` [m], from rest to rest with the acceleration it may have."""
     return math.sqrt(6.0 * distance / settings.urgent_acceleration)
+
+
+@kernel
+def ramp(cap: float, level: float, slope: float, times: Vector) -> Vector:
+    """Bounds (n,) [N] at `times` (n,) [s]: of `cap` the share `level`, which goes on with `slope` [1/s], 0 … 1."""
+    caps = np.empty(len(times))
+    for k in range(len(times)):
+        caps[k] = cap * min(max(level + slope * times[k], 0.0), 1.0)
+    return caps
 
 
 @record

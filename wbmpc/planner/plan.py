@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from wbmpc.planner.com_height import HeightPlan
 from wbmpc.planner.horizontal_motion import Motion
-from wbmpc.planner.plan_kernel import com_at, continue_plan
+from wbmpc.planner.plan_kernel import com_at, continue_plan, join_courses
 from wbmpc.record import record
 from wbmpc.signals import PlanReport, Setpoint, Vector
 
@@ -111,12 +111,12 @@ def com_course(now: Vector, motion: Motion | None, height: HeightPlan) -> tuple[
         height: stage 1's answer.
     """
     n = len(height.jerk)
-    states, jerk = np.empty((n + 1, 3, 3)), np.zeros((n, 3))
-    c, v, a = states[1:, :, 0], states[1:, :, 1], states[1:, :, 2]
-    states[0], jerk[:, 2] = now, height.jerk
-    c[:, 2], v[:, 2], a[:, 2] = height.height, height.velocity, height.acceleration
     if motion is None:
-        states[1:, :2] = now[:2]
+        jerk, (com, velocity, acceleration) = np.zeros((n, 2)), np.tile(now[:2].T[:, None], (1, n, 1))
     else:
-        jerk[:, :2], c[:, :2], v[:, :2], a[:, :2] = motion.jerk, motion.com, motion.velocity, motion.acceleration
-    return states, jerk
+        jerk, com, velocity, acceleration = motion.jerk, motion.com, motion.velocity, motion.acceleration
+    states, jerks = join_courses(
+        *(np.ascontiguousarray(now), jerk, com, velocity, acceleration),
+        *(height.jerk, height.height, height.velocity, height.acceleration),
+    )
+    return states, jerks

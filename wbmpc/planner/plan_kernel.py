@@ -2,7 +2,41 @@
 
 from __future__ import annotations
 
-from wbmpc.jit import short_kernel
+import numpy as np
+
+from wbmpc.jit import kernel, short_kernel
+from wbmpc.signals import Vector
+
+
+@kernel
+def join_courses(
+    now: Vector,
+    jerk: Vector,
+    com: Vector,
+    velocity: Vector,
+    acceleration: Vector,
+    vertical_jerk: Vector,
+    height: Vector,
+    vertical_velocity: Vector,
+    vertical_acceleration: Vector,
+) -> tuple[Vector, Vector]:
+    """States (N + 1, 3 axes, 3) = c, ċ, c̈, from `now` (3, 3) on, and jerks (N, 3), of horizontal (N, 2) and vertical
+    (N,) courses.
+    """
+    n = len(height)
+    states, jerks = np.empty((n + 1, 3, 3)), np.empty((n, 3))
+    states[0] = now
+    for k in range(n):
+        for axis in range(2):
+            jerks[k, axis] = jerk[k, axis]
+            states[k + 1, axis, 0] = com[k, axis]
+            states[k + 1, axis, 1] = velocity[k, axis]
+            states[k + 1, axis, 2] = acceleration[k, axis]
+        jerks[k, 2] = vertical_jerk[k]
+        states[k + 1, 2, 0] = height[k]
+        states[k + 1, 2, 1] = vertical_velocity[k]
+        states[k + 1, 2, 2] = vertical_acceleration[k]
+    return states, jerks
 
 
 @short_kernel

@@ -117,7 +117,7 @@ class Planner:
         hands = references.hand_targets(contacts, self._measured.palms)
         soles = self._gait.soles(self._gate)
         tasks = self._joints.tasks(
-            *references.attitude(contacts, float(soles.yaws.mean())),
+            *references.attitude(contacts, soles.heading),
             com=self._com.value[:, 0],
             vertical_velocity=float(height.velocity[0]),
             soles=soles,
@@ -283,7 +283,7 @@ class Planner:
     @property
     def _course(self) -> Vector:
         """(N, 3) [m] where the CoM will be: the last plan's."""
-        if self._last is None or not np.isfinite(self._last.report.com).all():
+        if self._last is None or not np.isfinite(self._last.report.com[-1, 0]):  # without an answer of stage 2
             return np.tile(self._com.value[:, 0], (self._preview.steps, 1))
         return self._last.report.com
 

@@ -61,7 +61,7 @@ class Posture:
         self._step = np.inf  # [rad, m] largest change of the last iteration
         self._left = PATIENCE
         frames = (*robot.sole_frames, *robot.palm_frames, *robot.elbow_frames, robot.torso_frame)
-        self._views = self._kinematics.views(frames[:6], (*robot.sole_frames, robot.torso_frame))
+        self._views, self._frames = self._kinematics.views, np.array(frames)
         self._chains = chains_of(robot.pin_model, frames)
         self._look()
         self._told = Targets(
@@ -74,19 +74,14 @@ class Posture:
         """Whether more iterations for the same targets would change nothing, or have been given up."""
         return self._step < SETTLED or self._left == 0
 
+    @property
+    def finished(self) -> bool:
+        """Whether there will be no more iterations for the same targets."""
+        return self._step < CONVERGED or self._left == 0
+
     def forearm(self, side: int) -> tuple[Vector, Vector]:
         """Palm and elbow (3,) of an arm in world [m] at the last iterate."""
         return self._places[2 + side], self._places[4 + side]
-
-    @property
-    def torso(self) -> Vector:
-        """(3, 3) torso to world at the last iterate."""
-        return self._torso
-
-    @property
-    def torso_heading(self) -> float:
-        """Yaw of the torso at the last iterate [rad]."""
-        return heading_of(self.torso)
 
     def iterate(
         self, count: int, *, soles: Vector, yaws: Vector, palms: list[PalmTarget | None], centre: Vector
@@ -111,7 +106,7 @@ class Posture:
         )
         if targets != self._targets:
             self._targets, self._step, self._left = targets, np.inf, PATIENCE
-        if self._step < CONVERGED or self._left == 0:
+        if self.finished:
             return
         told.soles[:], told.yaws[:], told.com[:2] = soles, yaws, centre
         told.com[2] = self._height + _level(soles)
@@ -121,12 +116,12 @@ class Posture:
                 told.palms[side] = palm.position
                 told.normals[side] = 0.0 if palm.normal is None else palm.normal
         for _ in range(count):
-            if self._step < CONVERGED or self._left == 0:
+            if self.finished:
                 break
             self._left -= 1
             self._kinematics.update_kinematics(self.q)
             posture_step(
-                *(self._views, *self._chains, told, self._com_cost, self.tilt_cost),
+                *(self._views, self._frames, *self._chains, told, self._com_cost, self.tilt_cost),
                 *(self.q, self._nominal, self._lower, self._upper, self._delta, self._found),
             )
             self.q = robot.integrate(self.q, self._delta)
@@ -141,8 +136,9 @@ class Posture:
 
     def _look(self) -> None:
         """Copy what others may ask of the configuration that Pinocchio has just computed."""
-        _, _, _, places, rotations = self._views
-        self._places, self._torso = np.array(places), rotations[2].copy()  # (6, 3) [m] soles, palms, elbows; (3, 3)
+        self._places = self._views[3][self._frames[:6], 3]  # (6, 3) [m] soles, palms, elbows
+        self.torso = self._kinematics.rotation(self._robot.torso_frame)  # (3, 3) torso to world
+        self.torso_heading = heading_of(self.torso)  # [rad]
 
     def _start(self, soles: Vector, yaws: Vector) -> Vector:
         """The nominal posture (nq,) over the feet: from afar the way there ends in a contorted optimum."""

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.frame_terms import frame_rows, turn_to_level
+from wbmpc.frame_terms import frame_rows, rotation_of, turn_to_level
 from wbmpc.jit import kernel
 from wbmpc.qp.cholesky import factor, substitute
 from wbmpc.signals import Vector
@@ -35,6 +35,7 @@ class Targets(NamedTuple):
 @kernel
 def posture_step(
     pin: Any,
+    frames: NDArray[np.int64],
     chains: NDArray[np.int64],
     lengths: NDArray[np.int64],
     targets: Targets,
@@ -50,25 +51,24 @@ def posture_step(
     """Write the step `delta` (nv,) of one iteration from `q` (nq,), and what there is at `q`.
 
     Args:
-        pin: Pinocchio's views at q: J (6, nv), J_com (3, nv), CoM, positions of soles, palms, elbows, rotations (3, 3)
-            of both soles and torso.
-        chains, lengths: of soles, palms, elbows and torso, see `chains_of`.
+        pin: Pinocchio's views at q, see `Kinematics`.
+        frames, chains, lengths: of soles, palms, elbows and torso, see `chains_of`.
         nominal: (nq,) the posture to deviate from as little as possible.
         lower, upper: (nj,) [rad].
         found: (5,) palm errors [m], largest palm or sole error [m], how far an elbow is too low [m], largest change.
     """
-    J, com_jacobian, com, positions, rotations = pin
+    J, com_jacobian, com, poses = pin
     nv = len(delta)
     rows, wanted, weight = np.zeros((ROWS, nv)), np.zeros(ROWS), np.zeros(ROWS)
     turn = np.empty(3)
     found[:] = 0.0
     for side in range(2):
-        first = SOLE_ROW + 6 * side
-        frame_rows(J, chains[side], lengths[side], positions[side], rows[first : first + 6])
-        turn_to_level(targets.yaws[side], rotations[side], turn)
+        first, sole = SOLE_ROW + 6 * side, poses[frames[side], 3]
+        frame_rows(J, chains[side], lengths[side], sole, rows[first : first + 6])
+        turn_to_level(targets.yaws[side], rotation_of(poses, frames[side]), turn)
         square = 0.0
         for i in range(3):
-            wanted[first + i] = targets.soles[side, i] - positions[side][i]
+            wanted[first + i] = targets.soles[side, i] - sole[i]
             wanted[first + 3 + i] = turn[i]
             square += wanted[first + i] ** 2
         weight[first : first + 6] = SOLE_COST
@@ -76,7 +76,7 @@ def posture_step(
     for side in range(2):
         if targets.given[side] == 0:
             continue
-        first, palm = PALM_ROW + 3 * side, positions[2 + side]
+        first, palm = PALM_ROW + 3 * side, poses[frames[2 + side], 3]
         frame_rows(J, chains[2 + side], lengths[2 + side], palm, rows[first : first + 3])
         square = 0.0
         for i in range(3):
@@ -89,7 +89,7 @@ def posture_step(
         weight[first : first + 3] = PALM_COST
         if targets.given[side] == 1:
             continue
-        excess, elbow = ELBOW_CLEARANCE, positions[4 + side]
+        excess, elbow = ELBOW_CLEARANCE, poses[frames[4 + side], 3]
         for i in range(3):
             excess -= targets.normals[side, i] * (elbow[i] - palm[i])
         if excess > 0.0:
@@ -105,7 +105,7 @@ def posture_step(
         wanted[COM_ROW + i] = targets.com[i] - com[i]
         weight[COM_ROW + i] = com_cost if i < 2 else HEIGHT_COST
     if tilt_cost > 0.0:
-        torso = rotations[2]
+        torso = rotation_of(poses, frames[6])
         for c in range(lengths[6]):
             k = chains[6, c]
             rows[TILT_ROW, k], rows[TILT_ROW + 1, k] = J[3, k], J[4, k]

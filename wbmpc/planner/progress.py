@@ -6,6 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.scenario import ExcursionTask
 from wbmpc.signals import Vector
 
@@ -81,13 +82,22 @@ class Progress:
         """σ (n,) at `times` (n,) seconds from now, the way out going on at `rate`."""
         if self.phase == TaskPhase.DONE:
             return np.zeros(len(times))
+        pace, duration, wait = max(rate, 0.0), self._go_time, 0.0
         if self.phase == TaskPhase.BACK:
-            sigmas = self.sigma - times / self._task.withdraw
-        else:
-            moving = times if self.phase != TaskPhase.WAIT else np.maximum(times - (self._task.start - time), 0.0)
-            sigmas = self.sigma + max(rate, 0.0) * moving / self._go_time
-        return np.minimum(np.maximum(sigmas, 0.0), 1.0)
+            pace, duration = -1.0, self._task.withdraw
+        elif self.phase == TaskPhase.WAIT:
+            wait = self._task.start - time
+        return _course(self.sigma, pace, duration, wait, times)
 
     def _move(self, rate: float, dt: float) -> None:
         self.sigma = min(max(self.sigma + rate * dt, 0.0), 1.0)
         self.sigma_rate = rate
+
+
+@kernel
+def _course(sigma: float, pace: float, duration: float, wait: float, times: Vector) -> Vector:
+    """σ (n,) at `times` (n,) [s] of a way of `duration` [s] at `pace` from `sigma` on, after a `wait` [s]."""
+    out = np.empty(len(times))
+    for k in range(len(times)):
+        out[k] = min(max(sigma + pace * max(times[k] - wait, 0.0) / duration, 0.0), 1.0)
+    return out

@@ -9,6 +9,7 @@ import numpy as np
 from wbmpc.jit import kernel
 from wbmpc.kinematics import Kinematics
 from wbmpc.planner.bands import NO_FOOT, UNBOUNDED, horizontal_band
+from wbmpc.planner.candidates import Candidate
 from wbmpc.planner.contacts import Contacts
 from wbmpc.planner.footstep import Feet
 from wbmpc.planner.lean import Lean
@@ -45,6 +46,7 @@ class References:
     def __init__(self, robot: Robot, tasks: Tasks, *, q: Vector, height: float, times: Vector) -> None:
         """Start with the posture `q` (nq,) and the CoM at `height` [m]; `times` (N,) are the knots [s]."""
         self._tasks, self._times, self._nominal_height = tasks, times, height
+        self._free_palms = np.full((len(SIDES), len(times), 3), np.nan)
         kinematics = Kinematics(robot)
         self._stand = Posture(kinematics, nominal=q, com_cost=COM_COST)
         self._reach_goal = Posture(kinematics, nominal=q, com_cost=COM_COST)
@@ -52,6 +54,7 @@ class References:
         self._lift = LiftPostures(kinematics, nominal=q)
         self._stride: Stride | None = None
         self._centre = np.zeros(2)  # [m] between the feet
+        self._distance: tuple[list[Candidate], Vector] | None = None  # d at this plan, with these contacts
 
     # ------------------------------------------------------------------ once a plan
 
@@ -99,6 +102,7 @@ class References:
 
     def paths(self, time: float, contacts: Contacts) -> tuple[Paths, Paths]:
         """At the tasks' own pace with the contacts' palms, and what the tasks alone would ask at full pace."""
+        self._distance = None
         full = self._paths(time, pace=1.0)
         held_up = any(task.progress.rate != 1.0 for task in self._tasks.current)
         palms, sigma = self._paths(time) if held_up else full
@@ -112,7 +116,7 @@ class References:
     def _paths(self, time: float, *, pace: float | None = None) -> Paths:
         """Of the tasks; `pace` of all their clocks, 0 … 1; None: each at its own gate's."""
         times = self._times
-        palms, sigma = np.full((len(SIDES), len(times), 3), np.nan), np.zeros(len(times))
+        palms, sigma = self._free_palms.copy(), np.zeros(len(times))
         for task in self._tasks.current:
             sigmas = task.progress.sigmas(time, times, rate=task.progress.rate if pace is None else pace)
             sigma = np.maximum(sigma, sigmas)
@@ -176,6 +180,11 @@ class References:
 
         The paper takes d as a constant of the robot; the posture makes it the constant of this target and this stance.
         """
+        if self._distance is None or self._distance[0] is not contacts.used:
+            self._distance = contacts.used, self._look_for_distance(contacts)
+        return self._distance[1]
+
+    def _look_for_distance(self, contacts: Contacts) -> Vector:
         if self._tasks.lifting is not None:
             return np.maximum(self._lift.distance(self._tasks.lifting)[:, :2], REACH_FLOOR)
         distance, goal = [(UNBOUNDED, UNBOUNDED)] * len(SIDES), self._goal.com

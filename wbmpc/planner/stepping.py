@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+
 import numpy as np
 
+from wbmpc.jit import kernel
 from wbmpc.planner.footholds import Footholds
-from wbmpc.planner.footstep import CAREFUL_LEAD, SIDE_SIGN, Feet, Footstep
+from wbmpc.planner.footstep import CAREFUL_LEAD, Feet, Footstep
 from wbmpc.planner.journey import Journey
 from wbmpc.planner.settings import GaitSettings
-from wbmpc.rotations import angle_difference, plane_rotation
+from wbmpc.rotations import angle_difference
 from wbmpc.scenario import GoTask, StepTask, Task, WalkTask
 from wbmpc.signals import Vector
 
@@ -29,7 +32,9 @@ class Stepping:
         ]
         self._walks = [(i, task) for i, task in enumerate(tasks) if isinstance(task, WalkTask)]
         commands = [command for _, walk in self._walks for command in walk.commands]
-        self._command_times = np.array([command.time for command in commands])  # [s]
+        commands.sort(key=lambda command: command.time)
+        self._command_times = [command.time for command in commands]  # [s] ascending
+        self._time_of_command = np.array(self._command_times)  # the same for kernels
         self._commands = np.array([(*command.velocity, command.yaw_rate) for command in commands]).reshape(-1, 3)
         self._steps = [(i, task) for i, task in enumerate(tasks) if isinstance(task, StepTask)]
         self._done: set[int] = set()
@@ -48,8 +53,8 @@ class Stepping:
         """Velocity command (forward, left, yaw rate) [m/s, rad/s]; None before the first one."""
         if not self.has_commands:
             return None
-        given = np.flatnonzero(self._command_times <= time + 1e-9)
-        return self._commands[given[-1]] if given.size else None
+        given = bisect_right(self._command_times, time + 1e-9)
+        return self._commands[given - 1] if given else None
 
     def next(self, feet: Feet, time: float, *, made: tuple[int, ...] = ()) -> Footstep | None:
         """The next step at `time` [s] from `feet`, None to stand; `made`: tasks of steps already previewed."""
@@ -68,15 +73,10 @@ class Stepping:
 
     def velocities(self, headings: Vector, times: Vector) -> Vector:
         """Wanted CoM velocities (n, 2) in world [m/s] at `times` (n,) [s] with the robot's `headings` (n,) [rad]."""
-        out = np.zeros((len(times), 2))
-        if not len(self._commands):
-            return out
-        given = self._command_times <= times[:, None] + 1e-9  # (n, commands); the last one counts
-        latest = given.shape[1] - 1 - np.argmax(given[:, ::-1], axis=1)
-        forward, left = self._commands[latest, :2].T * given.any(axis=1)
-        c, s = np.cos(headings), np.sin(headings)
-        out[:, 0], out[:, 1] = c * forward - s * left, s * forward + c * left
-        return out
+        if not self.has_commands:
+            return np.zeros((len(times), 2))
+        velocities: Vector = _velocities(self._time_of_command, self._commands, headings, times)
+        return velocities
 
     def _commanded(self, index: int, task: StepTask, feet: Feet) -> Footstep:
         side = ("left", "right").index(task.foot)
@@ -99,22 +99,13 @@ class Stepping:
 
     def _walk(self, feet: Feet, command: Vector) -> Footstep | None:
         settings = self._settings
-        moving = float(np.abs(command).max()) > STILL
+        moving = max(map(abs, command.tolist())) > STILL
         if not moving and (feet.last < 0 or feet.aligned):
             return None
-        vx, vy, omega = command
-        sideways, turning = 0 if vy >= 0.0 else 1, 0 if omega >= 0.0 else 1  # the foot that takes each motion
-        side = (sideways if abs(vy) >= 0.1 * abs(omega) else turning) if feet.last < 0 else 1 - feet.last
-        stance = 1 - side
-        period = settings.swing_time + settings.double_support
-        yaw = float(feet.yaws[stance]) + (2.0 * period * omega if side == turning else 0.0)
-        # lateral and turning motion are taken by one foot, for two steps; the forward one by both
-        width = settings.step_width + turning_room(settings, yaw - float(feet.yaws[stance]))
-        offset = np.array([vx * period, SIDE_SIGN[side] * width + (2.0 * period * vy if side == sideways else 0.0)])
-        shift = plane_rotation(0.5 * (float(feet.yaws[stance]) + yaw)) @ offset
-        apart = SIDE_SIGN[side] * plane_rotation(float(feet.yaws[stance]))[:, 1]
-        position = feet.positions[stance].copy()
-        position[:2] += shift + max(settings.narrowest - float(apart @ shift), 0.0) * apart  # a fast turn backwards
+        side, position, yaw = _walking_step(
+            *(feet.positions, feet.yaws, feet.last, command, settings.swing_time + settings.double_support),
+            *(settings.step_width, settings.turning_room, settings.narrowest),
+        )
         return Footstep(
             side=side,
             position=position,
@@ -128,6 +119,57 @@ class Stepping:
         )
 
 
-def turning_room(settings: GaitSettings, angle: float) -> float:
-    """Width [m] that soles need besides when one is turned by `angle` [rad] against the other."""
-    return settings.turning_room * abs(float(np.sin(angle)))
+@kernel
+def turning_room(room: float, angle: float) -> float:
+    """Width [m] that soles need besides when one is turned by `angle` [rad] against the other; `room` by 90°."""
+    return room * abs(np.sin(angle))
+
+
+@kernel
+def _walking_step(
+    positions: Vector,
+    yaws: Vector,
+    last: int,
+    command: Vector,
+    period: float,
+    step_width: float,
+    room: float,
+    narrowest: float,
+) -> tuple[int, Vector, float]:
+    """Which foot goes, where to (3,) [m] and its yaw [rad], from feet at `positions` (2, 3), `yaws` (2,).
+
+    Args:
+        last: side of the foot that moved last, -1: none.
+        command: (3,) forward, left [m/s], yaw rate [rad/s].
+        period: [s] of one step.
+        step_width, narrowest: [m]; `room` as in `turning_room`.
+    """
+    vx, vy, omega = command
+    sideways, turning = 0 if vy >= 0.0 else 1, 0 if omega >= 0.0 else 1  # the foot that takes each motion
+    side = (sideways if abs(vy) >= 0.1 * abs(omega) else turning) if last < 0 else 1 - last
+    stance, sign = 1 - side, 1.0 if side == 0 else -1.0
+    start = yaws[stance]
+    yaw = start + (2.0 * period * omega if side == turning else 0.0)
+    # lateral and turning motion are taken by one foot, for two steps; the forward one by both
+    width = step_width + turning_room(room, yaw - start)
+    offset = np.array([vx * period, sign * width + (2.0 * period * vy if side == sideways else 0.0)])
+    c, s = np.cos(0.5 * (start + yaw)), np.sin(0.5 * (start + yaw))
+    shift = np.dot(np.array([[c, -s], [s, c]]), offset)
+    apart = sign * np.array([-np.sin(start), np.cos(start)])
+    short = max(narrowest - np.dot(apart, shift), 0.0)  # in a fast turn backwards
+    position = positions[stance].copy()
+    for axis in range(2):
+        position[axis] += shift[axis] + short * apart[axis]
+    return side, position, yaw
+
+
+@kernel
+def _velocities(command_times: Vector, commands: Vector, headings: Vector, times: Vector) -> Vector:
+    out = np.zeros((len(times), 2))
+    for k in range(len(times)):
+        given = np.searchsorted(command_times, times[k] + 1e-9, side="right")
+        if given > 0:
+            forward, left = commands[given - 1, 0], commands[given - 1, 1]
+            c, s = np.cos(headings[k]), np.sin(headings[k])
+            out[k, 0], out[k, 1] = c * forward - s * left, s * forward + c * left
+    return out

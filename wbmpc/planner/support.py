@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from wbmpc.jit import kernel
-from wbmpc.record import record
 from wbmpc.signals import Vector
 
 PROJECTIONS = 20
@@ -61,8 +60,7 @@ def is_corner(a: Vector, b: Vector, p: Vector) -> bool:
     return turn > COLLINEAR or (turn > 0.0 and ux * vx + uy * vy < 0.0)
 
 
-@record
-class SupportPolygon:
+class SupportPolygon(NamedTuple):
     """Half-planes `normals @ z <= offsets` of a convex polygon, padded to MAX_EDGES rows.
 
     A padded row is 0 <= inf, so that a QP keeps its shape while the polygon changes.
@@ -95,7 +93,7 @@ class SupportPolygon:
 
     def shrunk(self, margin: float) -> SupportPolygon:
         """The same polygon with a further inset of `margin` [m]."""
-        return replace(self, offsets=self.offsets - margin)
+        return self._replace(offsets=self.offsets - margin)
 
     def nearest(self, point: Vector) -> Vector:
         """The point (2,) of the shrunk polygon nearest to `point` (2,) [m], by Dykstra's alternating projections."""

@@ -7,7 +7,7 @@ import numpy as np
 from wbmpc.planner.footstep_bounds import FootstepBounds
 from wbmpc.planner.support import UNEVEN, SupportPolygon
 from wbmpc.planner.support_interval import Interval
-from wbmpc.planner.support_kernel import horizon_polygons
+from wbmpc.planner.support_kernel import horizon_polygons, place_knots
 from wbmpc.planner.support_preview import MAX_FOOTSTEPS, SupportPreview
 from wbmpc.signals import Vector
 
@@ -16,30 +16,24 @@ NO_TRANSFER = (np.nan,) * 5
 
 
 class SupportHorizon:
-    """Intervals, the last of which lasts for ever, and the same as arrays, with the rest after the horizon."""
+    """Intervals, the last of which lasts for ever, as arrays."""
+
+    headings: Vector  # (N,) of the robot at the knots [rad]
 
     def __init__(self, intervals: list[Interval], times: Vector, *, standing: list[float]) -> None:
         """Knots at `times` (N,) [s from now]; heights `standing` [m] of the feet that stand now.
 
         Where soles stand at different heights all polygons are projected onto the plane of the feet that stand now.
         """
-        ends = np.array([interval.end for interval in intervals])
-        which = np.minimum(np.searchsorted(ends + 1e-9, times), len(intervals) - 1)  # a knot at an end is before it
-        last = int(which[-1])
-        both = intervals[last if intervals[last].swing < 0 else min(last + 1, len(intervals) - 1)]
-        self._intervals = [*intervals, Interval(NEVER, both.feet, -1, both.moved)]
-        self._which, self._times = np.append(which, len(intervals)), np.append(times, times[-1])
-        self._positions = np.array([interval.feet.positions for interval in self._intervals])  # (I + 1, 2, 3)
-        self._yaws = np.array([interval.feet.yaws for interval in self._intervals])  # (I + 1, 2)
+        self._times = times
+        self._phases = np.array([_numbers(interval) for interval in intervals])  # (I, 9)
+        self._positions = np.array([interval.feet.positions for interval in intervals])  # (I, 2, 3)
+        self._yaws = np.array([interval.feet.yaws for interval in intervals])  # (I, 2)
         plane = sum(standing) / len(standing)
-        uneven = np.abs(self._positions[:, :, 2] - plane).max() > UNEVEN
+        self._which, self.headings, uneven = place_knots(
+            times, self._phases, self._positions, self._yaws, plane, UNEVEN
+        )
         self.plane: float | None = plane if uneven else None  # [m]
-
-    @property
-    def headings(self) -> Vector:
-        """(N,) of the robot at the knots [rad]."""
-        mean: Vector = self._yaws.mean(axis=1)[self._which[:-1]]
-        return mean
 
     def preview(
         self,
@@ -60,35 +54,22 @@ class SupportHorizon:
             com_velocity: (N, 2) wanted [m/s].
             bounds: of the footsteps.
         """
-        intervals, which = self._intervals, self._which
-        swings = np.array([interval.swing for interval in intervals])
-        transfers = np.array([_numbers(interval) for interval in intervals])
-        counts, vertices, normals, offsets, centres, planes, shares = horizon_polygons(
-            which,
-            self._times,
-            margin + growth * self._times,
-            np.array([interval.end for interval in intervals]),
-            self._positions,
-            self._yaws,
-            swings,
-            np.array([interval.moved for interval in intervals]),
-            transfers,
-            half_extents,
-            np.nan if self.plane is None else self.plane,
-            np.vstack([com, com[-1:]]),
-            MAX_FOOTSTEPS,
+        counts, vertices, normals, offsets, centres, planes, shares, centring, between = horizon_polygons(
+            *(self._which, self._times, margin, growth, self._phases, self._positions, self._yaws, half_extents),
+            *(np.nan if self.plane is None else self.plane, com, MAX_FOOTSTEPS),
         )
-        onto_one = (swings >= 0) | ~np.isnan(transfers[:, 0])  # one foot carries, or will in a moment
         return SupportPreview(
             normals=normals[:-1],
             offsets=offsets[:-1],
             shift=shares[:-1],
             polygons=tuple(
-                SupportPolygon(vertices[k, : counts[k]], normals[k], offsets[k], centres[k], float(planes[k]))
-                for k in range(len(which) - 1)
+                SupportPolygon(corners[:count], *rest)
+                for corners, count, *rest in zip(
+                    *(vertices[:-1], counts[:-1].tolist(), normals, offsets, centres, planes.tolist()), strict=False
+                )
             ),
             centres=centres[:-1],
-            centring=onto_one[which[:-1]].astype(float),
+            centring=centring,
             rest_normals=normals[-1],
             rest_offsets=offsets[-1],
             rest_shift=shares[-1],
@@ -98,11 +79,14 @@ class SupportHorizon:
             placement_upper=bounds.placement_upper,
             lower=bounds.lower,
             upper=bounds.upper,
-            com_reference=self._positions[:, :, :2].mean(axis=1)[which[:-1]],
+            com_reference=between,
             com_velocity=com_velocity,
         )
 
 
 def _numbers(interval: Interval) -> tuple[float, ...]:
-    transfer = interval.transfer
-    return NO_TRANSFER if transfer is None else (transfer.begin, *transfer.before, *transfer.after)
+    """An interval as a row of `horizon_polygons`' phases."""
+    end, _, swing, moved, transfer = interval
+    if transfer is None:
+        return end, swing, *moved, *NO_TRANSFER
+    return end, swing, *moved, transfer.begin, *transfer.before, *transfer.after

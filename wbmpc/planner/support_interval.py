@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wbmpc.planner.footstep import Feet, Footstep
 from wbmpc.planner.support import SupportPolygon, foot_corners
-from wbmpc.record import record
 from wbmpc.signals import Vector
 
 
-@record
-class Transfer:
+class Transfer(NamedTuple):
     """The load goes from foot to foot: shares of left and right go linearly from `before` to `after`."""
 
     begin: float  # [s from now]
@@ -28,8 +28,7 @@ class Transfer:
         return cls(end - step.double_support, before, shares[1 - step.side])
 
 
-@record
-class Interval:
+class Interval(NamedTuple):
     """Until `end` the robot stands on `feet`, but for a foot that swings.
 
     In a double support between two walking steps the ZMP may be in w_L P_L ⊕ w_R P_R, a sole that slides from one foot

@@ -6,6 +6,7 @@ import numpy as np
 
 from wbmpc.planner.footstep import Footstep
 from wbmpc.planner.hand_path import minimum_jerk
+from wbmpc.rotations import length
 from wbmpc.signals import Vector
 
 RISE = 0.5  # share of the swing after which a foot that goes over at once is up
@@ -31,8 +32,7 @@ class Swing:
     def move_target(self, target: Vector, dt: float) -> None:
         """Move the landing place towards `target` (2,) [m], no further than the speed allows in dt [s]."""
         way = target - self.target[:2]
-        length = float(np.linalg.norm(way))
-        way *= min(1.0, self._speed * dt / max(length, 1e-9))
+        way *= min(1.0, self._speed * dt / max(length(way), 1e-9))
         self.target[:2] += way
         self._target_velocity[:2] = way / dt
 

@@ -36,7 +36,9 @@ class Tasks:
         self._excursions: list[Reach | Lean] = [*self.reaches, *self.leans]
         self._by_index = dict(zip(_reach_indices(tasks), self.reaches, strict=True))
         self._moves: list[TargetMove] = []  # ordered since the last plan
-        self.current = self._pick()  # the reaches still to be done, or the lean that comes before them
+        self.current: list[Reach] | list[Lean] = []  # the reaches still to be done, or the lean that comes before them
+        self.leaning: Lean | None = None  # the lean that is current, if one is
+        self._pick()
         self.shrink = 0.0  # [m] by which d of a reach's hand is smaller than in its posture
 
     def order(self, move: TargetMove) -> None:
@@ -82,7 +84,7 @@ class Tasks:
                 task.advance(time, dt, gate_open=gate_open, com=com)
             if task.progress.phase != before:
                 events.append(f"{name}: {before.name.lower()} -> {task.progress.phase.name.lower()}")
-                self.current = self._pick()
+                self._pick()
 
     def _move(self, move: TargetMove, palms: Vector, events: list[str]) -> None:
         """Move a reach's target, unless its hand is no longer free for it."""
@@ -93,7 +95,7 @@ class Tasks:
             events.append(f"reach {SIDES[reach.side]}: target not moved, {busy}")
             return
         reach.move(move.target, palm=palms[reach.side])
-        self.current = self._pick()
+        self._pick()
         events.append(f"reach {SIDES[reach.side]}: target moved to ({place}) m")
 
     def takes_along(self, *, stepping: bool) -> bool:
@@ -103,26 +105,21 @@ class Tasks:
     def go_along(self, com: Vector, course: Vector, soles: SoleReferences) -> None:
         """See `Carry.follow`; the heading is that of the feet's references, `soles`."""
         assert self.lift is not None
-        heading, yaw_rate = float(soles.yaws.mean()), float(soles.yaw_rates.mean())
-        self.lift.go_along(com, course, heading=heading, yaw_rate=yaw_rate)
+        self.lift.go_along(com, course, heading=soles.heading, yaw_rate=float(soles.yaw_rates.mean()))
 
     @property
     def hold_feet(self) -> bool:
         """Whether the feet must stay where they are."""
         return self.lift is not None and self.lift.hold_feet
 
-    def _pick(self) -> list[Reach] | list[Lean]:
+    def _pick(self) -> None:
         reaches = [reach for reach in self.reaches if reach.progress.phase != TaskPhase.DONE]
         leans = [lean for lean in self.leans if lean.progress.phase != TaskPhase.DONE]
         first = min(leans, key=lambda lean: lean.task.start, default=None)
         if first is None or any(reach.task.start < first.task.start for reach in reaches):
-            return reaches
-        return [first]
-
-    @property
-    def leaning(self) -> Lean | None:
-        """The lean that is current, if one is."""
-        return next((task for task in self.current if isinstance(task, Lean)), None)
+            self.current, self.leaning = reaches, None
+        else:
+            self.current, self.leaning = [first], first
 
     @property
     def lifting(self) -> Lift | None:

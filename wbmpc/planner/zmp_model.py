@@ -71,11 +71,16 @@ def _model(
     return a, b, offset
 
 
-def need_at_rest(com: Vector, *, polygon: SupportPolygon, mass: float) -> Need:
-    """The need, of one knot, of standing still with the CoM at `com` (3,) [m]: the smallest shift into the polygon."""
+def shift_to_rest(com: Vector, polygon: SupportPolygon) -> Vector:
+    """The smallest shift (2,) [m] into the polygon that lets the CoM rest at `com` (3,) [m]."""
+    return polygon.nearest(com[:2]) - com[:2]
+
+
+def need_at_rest(com: Vector, *, polygon: SupportPolygon, shift: Vector, mass: float) -> Need:
+    """The need, of one knot, of standing still with the CoM at `com` (3,) [m], given its `shift_to_rest` (2,)."""
     zmp = com[:2]
     return Need(
-        delta_z=(polygon.nearest(zmp) - zmp)[None],
+        delta_z=shift[None],
         zmp=zmp[None],
         weight=np.array([mass * GRAVITY]),
         polygons=(polygon,),
