@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from wbmpc.checks.blocks import by_blocks, lengths
 from wbmpc.recorder import Recorder
 from wbmpc.signals import GRAVITY, ContactPhase, Vector
 
@@ -82,7 +83,7 @@ class CheckContext:
         """Number of steps in `duration` [s], at least one."""
         return max(1, round(duration / self.facts.timestep))
 
-    @cached_property
+    @property
     def contact_time(self) -> Vector:
         """(c,) [s] time of each contact."""
         return self.time[self.recorder.contact_tick]
@@ -93,11 +94,15 @@ class CheckContext:
 
         Where it does not (self-collision, or two objects), the two geoms are in MuJoCo's order.
         """
-        geoms = self.recorder.contacts.geoms
+        ordered = by_blocks(self._robot_first, self.recorder.contacts.geoms)
+        is_robot = self.facts.geom_is_robot
+        outside = by_blocks(lambda pair: is_robot[pair[:, 0]] ^ is_robot[pair[:, 1]], ordered)
+        return ordered[:, 0], ordered[:, 1], outside
+
+    def _robot_first(self, geoms: NDArray[np.int32]) -> NDArray[np.int32]:
         robot = self.facts.geom_is_robot[geoms]  # (c, 2)
         swap = robot[:, 1] & ~robot[:, 0]
-        ordered = np.where(swap[:, None], geoms[:, ::-1], geoms)
-        return ordered[:, 0], ordered[:, 1], robot[:, 0] ^ robot[:, 1]
+        return np.where(swap[:, None], geoms[:, ::-1], geoms)
 
     @cached_property
     def palm_force(self) -> Vector:
@@ -112,7 +117,7 @@ class CheckContext:
     @cached_property
     def sole_touching(self) -> NDArray[np.bool_]:
         """(n, 2) whether anything touches each foot."""
-        return np.linalg.norm(self.sole_force, axis=2) > TOUCH
+        return lengths(self.sole_force) > TOUCH
 
     @cached_property
     def sample_ticks(self) -> NDArray[np.int64]:

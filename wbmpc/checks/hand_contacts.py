@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import lengths
 from wbmpc.checks.context import CONTACT_FORCE, CheckContext
 from wbmpc.checks.result import CheckResult, at_least, at_most, first_time
 from wbmpc.checks.stretches import joined
@@ -121,6 +122,6 @@ def _sequence(context: CheckContext) -> list[tuple[str, HandContact]]:
 
 def _force(context: CheckContext, rows: NDArray[np.bool_]) -> Vector:
     """(n,) [N] sum over the chosen `rows` (c,) of the contacts of the magnitudes of their forces, at each tick."""
-    magnitude = np.linalg.norm(context.recorder.contacts.force[rows], axis=1)
+    magnitude = lengths(context.recorder.contacts.force[rows])
     tick, ticks = context.recorder.contact_tick[rows], context.recorder.ticks
     return np.bincount(tick, weights=magnitude, minlength=ticks).astype(np.float64)
