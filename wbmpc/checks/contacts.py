@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wbmpc.checks import settings
 from wbmpc.checks.blocks import by_blocks, lengths
 from wbmpc.checks.context import CheckContext
-from wbmpc.checks.result import CheckResult, at_most, first_time
+from wbmpc.checks.result import CheckResult, at_most
 from wbmpc.signals import SIDES
 
 
@@ -32,7 +32,7 @@ class DeclaredContactsCheck:
         named = sorted(f"{facts.geom_name[a]} – {facts.geom_name[b]}" for a, b in pairs)
         more = f" and {len(named) - 3} more" if len(named) > 3 else ""
         message = f"undeclared contact: {', '.join(named[:3])}{more}"
-        when = first_time(context.contact_time, undeclared)
+        when = context.first_contact_time(undeclared)
         force = lengths(context.recorder.contacts.force[undeclared])
         return at_most(name, float(force.max()), self.config.min_force, "N", message, when=when)
 
@@ -62,7 +62,7 @@ def _chosen_palm(context: CheckContext, rows: NDArray[np.int64], release_time: f
     """
     facts, ticks = context.facts, context.recorder.ticks
     robot_geom, other_geom, outside = (side[rows] for side in context.contact_sides)
-    tick, palm = context.recorder.contact_tick[rows], facts.geom_palm[robot_geom]
+    tick, palm = context.contact_tick(rows), facts.geom_palm[robot_geom]
     grace = context.ticks(release_time)
     declared = np.zeros(tick.size, dtype=bool)
     names, code = context.patch_codes
@@ -95,6 +95,6 @@ class PenetrationCheck:
         worst = int(np.argmax(depth))
         a, b = context.recorder.contacts.geoms[worst]
         names = context.facts.geom_name
-        message = f"deepest at {names[a]} – {names[b]}, t = {context.contact_time[worst]:.3f} s"
-        when = first_time(context.contact_time, ~(depth <= self.config.max))
+        message = f"deepest at {names[a]} – {names[b]}, t = {context.contact_time(worst):.3f} s"
+        when = context.first_contact_time(~(depth <= self.config.max))
         return at_most(name, max(0.0, float(depth[worst])), self.config.max, "m", message, when=when)

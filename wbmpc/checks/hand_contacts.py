@@ -122,6 +122,6 @@ def _sequence(context: CheckContext) -> list[tuple[str, HandContact]]:
 
 def _force(context: CheckContext, rows: NDArray[np.bool_]) -> Vector:
     """(n,) [N] sum over the chosen `rows` (c,) of the contacts of the magnitudes of their forces, at each tick."""
-    magnitude = lengths(context.recorder.contacts.force[rows])
-    tick, ticks = context.recorder.contact_tick[rows], context.recorder.ticks
+    chosen, ticks = np.flatnonzero(rows), context.recorder.ticks
+    magnitude, tick = lengths(context.recorder.contacts.force[chosen]), context.contact_tick(chosen)
     return np.bincount(tick, weights=magnitude, minlength=ticks).astype(np.float64)

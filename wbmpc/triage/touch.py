@@ -92,7 +92,7 @@ def collisions(context: CheckContext, config: DeclaredContacts) -> Iterator[Find
         if pair in seen:
             continue
         seen.add(pair)
-        time = float(context.contact_time[row])
+        time = context.contact_time(int(row))
         a, b = (context.facts.geom_name[geom] for geom in pair)
         cause = Cause.COLLISION if outside[row] else Cause.SELF_COLLISION
         yield Finding(cause, time, np.inf, f"{a} touches {b}, {force[row]:.1f} N")
