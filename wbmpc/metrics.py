@@ -16,7 +16,6 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
     if recorder.ticks == 0:
         return {"simulated_time": 0.0}
     joints = facts.no_load_speed.size
-    depth = -recorder.contacts.distance
     palm_push = lengths(context.palm_force)  # (n, 2)
     stage3 = sum(plan.stage3.status != SolveStatus.NOT_RUN for plan in recorder.plans)
     hands = hand_contacts(context)
@@ -25,11 +24,11 @@ def metrics_of(context: CheckContext) -> dict[str, float]:
         "robot_mass": facts.mass,
         "com_height_min": float(recorder.com[:, 2].min()),
         "com_height_max": float(recorder.com[:, 2].max()),
-        "com_speed_max": float(np.linalg.norm(recorder.com_velocity, axis=1).max()),
+        "com_speed_max": float(lengths(recorder.com_velocity).max()),
         "torso_up_min": float(recorder.torso_up.min()),
         "torque_peak_fraction": float((_largest(recorder.torque) / facts.stall_torque).max()),
         "speed_peak_fraction": float((_largest(recorder.qvel[:, 6 : 6 + joints]) / facts.no_load_speed).max()),
-        "penetration_max": float(max(depth.max(initial=0.0), 0.0)),
+        "penetration_max": 0.0 - float(recorder.contacts.distance.min(initial=0.0)),
         "hand_force_max": float(palm_push.max()),
         "hand_contacts": float(len(hands)),
         "first_hand_contact": float(recorder.time[hands[0].start]) if hands else np.nan,

@@ -89,12 +89,12 @@ class PenetrationCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        depth = -context.recorder.contacts.distance  # (c,) [m]
-        if depth.size == 0:
+        distance = context.recorder.contacts.distance  # (c,) [m]
+        if distance.size == 0:
             return at_most(name, 0.0, self.config.max, "m", "nothing ever touched", when=None)
-        worst = int(np.argmax(depth))
+        worst = int(np.argmin(distance))  # of a nan when there is one
         a, b = context.recorder.contacts.geoms[worst]
         names = context.facts.geom_name
         message = f"deepest at {names[a]} – {names[b]}, t = {context.contact_time(worst):.3f} s"
-        when = context.first_contact_time(~(depth <= self.config.max))
-        return at_most(name, max(0.0, float(depth[worst])), self.config.max, "m", message, when=when)
+        when = context.first_contact_time(~by_blocks(lambda block: -block <= self.config.max, distance))
+        return at_most(name, max(0.0, float(-distance[worst])), self.config.max, "m", message, when=when)
