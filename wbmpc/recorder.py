@@ -50,6 +50,7 @@ class Contacts:
     distance: NDArray[np.float64]  # (c,) [m] negative: penetration
 
 
+_CONTACT = np.dtype([("geoms", np.int32, 2), ("position", float, 3), ("force", float, 3), ("distance", float)])
 _truth, _outcome = (attrgetter(*fields) for _, _, fields in EVERY_TICK)
 _state, _setpoint, _command = (attrgetter(*fields) for _, _, fields in SAMPLED)
 
@@ -85,9 +86,10 @@ class Recorder:
         self.names = self._every.names + self._sampled.names  # of all columns, each an attribute of the recorder
         self._tables = {name: table for table in (self._every, self._sampled) for name in table.names}
         self._state = self._every.bytes_of("qpos", "qvel")
-        self._contact_capacity = 12 * max(1, expected_ticks)
         self._contact_total = 0
-        self._contacts = self._allocate_contacts(self._contact_capacity)
+        # In one piece, which the system gives page by page as it is written: most runs have fewer contacts.
+        self._contact_rows = np.zeros(12 * max(1, expected_ticks), _CONTACT)
+        self._contacts = _columns(self._contact_rows)
         self._ticks = 0
         self._hash = hashlib.sha256()
         self.plans: list[PlanReport] = []
@@ -202,15 +204,14 @@ class Recorder:
 
     # ---------------------------------------------------------------- inside
 
-    @staticmethod
-    def _allocate_contacts(rows: int) -> Contacts:
-        return Contacts(np.zeros((rows, 2), np.int32), np.zeros((rows, 3)), np.zeros((rows, 3)), np.zeros(rows))
-
     def _append_contacts(self, truth: Truth) -> None:
         count = truth.contact_count
         start, stop = self._contact_total, self._contact_total + count
-        if stop > self._contact_capacity:
-            self._grow_contacts()
+        if stop > len(self._contact_rows):
+            # At least one tick's worth of room, however small the table was.
+            more = np.zeros(len(self._contact_rows) + 1000, _CONTACT)
+            self._contact_rows = np.concatenate([self._contact_rows, more])
+            self._contacts = _columns(self._contact_rows)
         table = self._contacts
         table.geoms[start:stop] = truth.contact_geoms[:count]
         table.position[start:stop] = truth.contact_position[:count]
@@ -218,13 +219,9 @@ class Recorder:
         table.distance[start:stop] = truth.contact_distance[:count]
         self._contact_total = stop
 
-    def _grow_contacts(self) -> None:
-        old, rows = self._contacts, self._contact_capacity
-        # At least one tick's worth of room, however small the table was.
-        new = self._allocate_contacts(2 * rows + 1000)
-        new.geoms[:rows], new.position[:rows], new.force[:rows] = old.geoms, old.position, old.force
-        new.distance[:rows] = old.distance
-        self._contacts, self._contact_capacity = new, 2 * rows + 1000
+
+def _columns(rows: NDArray[Any]) -> Contacts:
+    return Contacts(rows["geoms"], rows["position"], rows["force"], rows["distance"])
 
 
 def _states(rows: NDArray[Any]) -> NDArray[np.float64]:

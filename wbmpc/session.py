@@ -95,6 +95,7 @@ def run_scenario(
             )
         trim()  # what the loop has freed, before the checks ask for more
         verdict = verdict_of(recorder, scenario, name=name, model=model, robot=robot)
+        trim()  # what the checks have freed, before the recording is finished
         for sink in (file, view):
             if sink is not None:
                 sink.finish(verdict.as_dict())

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import by_blocks, lengths
 from wbmpc.checks.context import CheckContext
-from wbmpc.checks.result import CheckResult, at_most, first_time
+from wbmpc.checks.result import CheckResult, at_most
 from wbmpc.signals import SIDES
 
 
@@ -27,32 +28,41 @@ class DeclaredContactsCheck:
         undeclared = undeclared_contacts(context, self.config)
         if not undeclared.any():
             return at_most(name, 0.0, self.config.min_force, "N", "only declared pairs touched", when=None)
-        force = np.linalg.norm(context.recorder.contacts.force, axis=1)  # (c,)
         pairs = {(int(a), int(b)) for a, b in zip(robot_geom[undeclared], other_geom[undeclared], strict=True)}
         named = sorted(f"{facts.geom_name[a]} – {facts.geom_name[b]}" for a, b in pairs)
         more = f" and {len(named) - 3} more" if len(named) > 3 else ""
         message = f"undeclared contact: {', '.join(named[:3])}{more}"
-        when = first_time(context.contact_time, undeclared)
-        return at_most(name, float(force[undeclared].max()), self.config.min_force, "N", message, when=when)
+        when = context.first_contact_time(undeclared)
+        force = lengths(context.recorder.contacts.force[undeclared])
+        return at_most(name, float(force.max()), self.config.min_force, "N", message, when=when)
 
 
 def undeclared_contacts(context: CheckContext, config: settings.DeclaredContacts) -> NDArray[np.bool_]:
     """(c,) contacts, of more than a touch, that nobody declared."""
     facts = context.facts
-    robot_geom, other_geom, outside = context.contact_sides
-    both_robot = facts.geom_is_robot[robot_geom] & facts.geom_is_robot[other_geom]
-    foot_on_ground = outside & (facts.geom_foot[robot_geom] >= 0) & facts.geom_walkable[other_geom]
     to_lift = [geom for thing in facts.lifted_objects for geom in thing.geoms]
-    palm_on_load = outside & (facts.geom_palm[robot_geom] >= 0) & np.isin(other_geom, to_lift)
-    declared = ~(outside | both_robot) | foot_on_ground | palm_on_load | _chosen_palm(context, config.release_time)
-    return ~declared & ~(np.linalg.norm(context.recorder.contacts.force, axis=1) <= config.min_force)
+
+    def unexplained(robot_geom, other_geom, outside, force):  # type: ignore[no-untyped-def]
+        both_robot = facts.geom_is_robot[robot_geom] & facts.geom_is_robot[other_geom]
+        foot_on_ground = outside & (facts.geom_foot[robot_geom] >= 0) & facts.geom_walkable[other_geom]
+        palm_on_load = outside & (facts.geom_palm[robot_geom] >= 0) & np.isin(other_geom, to_lift)
+        declared = ~(outside | both_robot) | foot_on_ground | palm_on_load
+        return ~declared & ~(np.linalg.norm(force, axis=1) <= config.min_force)
+
+    undeclared = by_blocks(unexplained, *context.contact_sides, context.recorder.contacts.force)
+    rows = np.flatnonzero(undeclared)
+    undeclared[rows] = ~_chosen_palm(context, rows, config.release_time)
+    return undeclared
 
 
-def _chosen_palm(context: CheckContext, release_time: float) -> NDArray[np.bool_]:
-    """(c,) contacts of a palm with the object of a patch that is, or within `release_time` was, chosen for it."""
+def _chosen_palm(context: CheckContext, rows: NDArray[np.int64], release_time: float) -> NDArray[np.bool_]:
+    """Which contacts, of these `rows`, are a palm's with the object of a patch chosen for it.
+
+    A patch counts that is, or within `release_time` was, chosen.
+    """
     facts, ticks = context.facts, context.recorder.ticks
-    robot_geom, other_geom, outside = context.contact_sides
-    tick, palm = context.recorder.contact_tick, facts.geom_palm[robot_geom]
+    robot_geom, other_geom, outside = (side[rows] for side in context.contact_sides)
+    tick, palm = context.contact_tick(rows), facts.geom_palm[robot_geom]
     grace = context.ticks(release_time)
     declared = np.zeros(tick.size, dtype=bool)
     names, code = context.patch_codes
@@ -79,12 +89,12 @@ class PenetrationCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        depth = -context.recorder.contacts.distance  # (c,) [m]
-        if depth.size == 0:
+        distance = context.recorder.contacts.distance  # (c,) [m]
+        if distance.size == 0:
             return at_most(name, 0.0, self.config.max, "m", "nothing ever touched", when=None)
-        worst = int(np.argmax(depth))
+        worst = int(np.argmin(distance))  # of a nan when there is one
         a, b = context.recorder.contacts.geoms[worst]
         names = context.facts.geom_name
-        message = f"deepest at {names[a]} – {names[b]}, t = {context.contact_time[worst]:.3f} s"
-        when = first_time(context.contact_time, ~(depth <= self.config.max))
-        return at_most(name, max(0.0, float(depth[worst])), self.config.max, "m", message, when=when)
+        message = f"deepest at {names[a]} – {names[b]}, t = {context.contact_time(worst):.3f} s"
+        when = context.first_contact_time(~by_blocks(lambda block: -block <= self.config.max, distance))
+        return at_most(name, max(0.0, float(-distance[worst])), self.config.max, "m", message, when=when)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from wbmpc.checks.blocks import by_blocks, lengths
 from wbmpc.recorder import Recorder
-from wbmpc.signals import GRAVITY, ContactPhase, Vector
+from wbmpc.signals import GRAVITY, SIDES, ContactPhase, Vector
 
 TOUCH = 0.01  # [N] a lighter contact is none
 CONTACT_FORCE = 0.3  # [N] lighter touches of a palm do not count as a contact made; the palms' sensing threshold
@@ -83,9 +84,21 @@ class CheckContext:
         return max(1, round(duration / self.facts.timestep))
 
     @cached_property
-    def contact_time(self) -> Vector:
-        """(c,) [s] time of each contact."""
-        return self.time[self.recorder.contact_tick]
+    def _first_contact(self) -> NDArray[np.int64]:
+        """(n + 1,) rows of the contacts at which those of each tick begin, and their number."""
+        return np.concatenate([[0], np.cumsum(self.recorder.contact_count)])
+
+    def contact_tick(self, rows: ArrayLike) -> NDArray[np.int64]:
+        """Ticks of these `rows` (r,) of the contacts."""
+        return np.searchsorted(self._first_contact, rows, side="right") - 1
+
+    def contact_time(self, row: int) -> float:
+        """[s] time of one of the contacts."""
+        return float(self.time[self.contact_tick(row)])
+
+    def first_contact_time(self, violated: NDArray[np.bool_]) -> float | None:
+        """[s] time of the first contact that is true in `violated` (c,); None when none is."""
+        return self.contact_time(int(np.argmax(violated))) if violated.any() else None
 
     @cached_property
     def contact_sides(self) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.bool_]]:
@@ -93,11 +106,15 @@ class CheckContext:
 
         Where it does not (self-collision, or two objects), the two geoms are in MuJoCo's order.
         """
-        geoms = self.recorder.contacts.geoms
+        ordered = by_blocks(self._robot_first, self.recorder.contacts.geoms)
+        is_robot = self.facts.geom_is_robot
+        outside = by_blocks(lambda pair: is_robot[pair[:, 0]] ^ is_robot[pair[:, 1]], ordered)
+        return ordered[:, 0], ordered[:, 1], outside
+
+    def _robot_first(self, geoms: NDArray[np.int32]) -> NDArray[np.int32]:
         robot = self.facts.geom_is_robot[geoms]  # (c, 2)
         swap = robot[:, 1] & ~robot[:, 0]
-        ordered = np.where(swap[:, None], geoms[:, ::-1], geoms)
-        return ordered[:, 0], ordered[:, 1], robot[:, 0] ^ robot[:, 1]
+        return np.where(swap[:, None], geoms[:, ::-1], geoms)
 
     @cached_property
     def palm_force(self) -> Vector:
@@ -112,7 +129,7 @@ class CheckContext:
     @cached_property
     def sole_touching(self) -> NDArray[np.bool_]:
         """(n, 2) whether anything touches each foot."""
-        return np.linalg.norm(self.sole_force, axis=2) > TOUCH
+        return lengths(self.sole_force) > TOUCH
 
     @cached_property
     def sample_ticks(self) -> NDArray[np.int64]:
@@ -127,21 +144,23 @@ class CheckContext:
     @cached_property
     def world_force(self) -> Vector:
         """(n, 3) [N] force of the whole world on the robot, from the plant's contacts."""
-        _, _, outside = self.contact_sides
-        return self._sums(self.recorder.contact_tick[outside], outside, self.recorder.ticks)
+        return self._force_on(np.zeros_like(self.facts.geom_foot), parts=1)[:, 0]
 
-    def _force_on(self, side_of_geom: NDArray[np.int64]) -> Vector:
+    def _force_on(self, part_of_geom: NDArray[np.int64], parts: int = len(SIDES)) -> Vector:
+        """(n, parts, 3) [N] force of the world on the geoms of each part; -1: of none."""
         robot_geom, _, outside = self.contact_sides
-        side = side_of_geom[robot_geom]
-        rows = outside & (side >= 0)
-        place = 2 * self.recorder.contact_tick[rows] + side[rows]
-        return self._sums(place, rows, 2 * self.recorder.ticks).reshape(-1, 2, 3)
-
-    def _sums(self, place: NDArray[np.int64], rows: NDArray[np.bool_], count: int) -> Vector:
-        """(count, 3) [N] forces of the chosen `rows` (c,) of the contacts, added up at each one's `place`."""
         force = self.recorder.contacts.force
-        axes = [np.bincount(place, weights=force[rows, axis], minlength=count) for axis in range(3)]
-        return np.stack(axes, axis=1)
+
+        def sums(first: NDArray[np.int64], stop: NDArray[np.int64]) -> Vector:  # contacts of each tick of a block
+            rows = slice(first[0], stop[-1]) if len(first) else slice(0)
+            part = part_of_geom[robot_geom[rows]]
+            counted = outside[rows] & (part >= 0)
+            place = (parts * np.repeat(np.arange(len(first)), stop - first) + part)[counted]
+            pushing, count = force[rows][counted], parts * len(first)
+            axes = [np.bincount(place, weights=pushing[:, axis], minlength=count) for axis in range(3)]
+            return np.stack(axes, axis=1).reshape(-1, parts, 3).astype(np.float64, copy=False)
+
+        return by_blocks(sums, self._first_contact[:-1], self._first_contact[1:])
 
     @cached_property
     def plan_of_tick(self) -> NDArray[np.int64]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import by_blocks, lengths
 from wbmpc.checks.context import CONTACT_FORCE, CheckContext
 from wbmpc.checks.result import CheckResult, at_least, at_most, first_time
 from wbmpc.checks.stretches import joined
@@ -85,13 +86,11 @@ class ContactSequenceCheck:
 
 def hand_contacts(context: CheckContext) -> list[HandContact]:
     """Contacts of a palm with one object after another in the order in which they began."""
-    robot_geom, other_geom, outside = context.contact_sides
-    palm = context.facts.geom_palm[robot_geom]
+    rows, palm, other_geom = _on_palms(context)
     contacts = []
     for side in range(len(SIDES)):
-        on_palm = outside & (palm == side)
-        for geom in np.unique(other_geom[on_palm]):
-            touching = _force(context, on_palm & (other_geom == geom)) > CONTACT_FORCE
+        for geom in np.unique(other_geom[palm == side]):
+            touching = _force(context, rows[(palm == side) & (other_geom == geom)]) > CONTACT_FORCE
             contacts += [HandContact(side, *span) for span in joined(touching, context.ticks(EPISODE_GAP))]
     return sorted(contacts, key=lambda contact: contact.start)
 
@@ -101,13 +100,12 @@ def _sequence(context: CheckContext) -> list[tuple[str, HandContact]]:
 
     A hand that comes back to the patch of the latest contact, its own, goes on with that contact.
     """
-    robot_geom, other_geom, outside = context.contact_sides
-    palm, (names, code) = context.facts.geom_palm[robot_geom], context.patch_codes
+    (rows, palm, other_geom), (names, code) = _on_palms(context), context.patch_codes
     found = []
     for index, patch in enumerate(names):
-        on_object = outside & np.isin(other_geom, list(context.facts.patch_geoms[patch]))
+        on_object = np.isin(other_geom, list(context.facts.patch_geoms[patch]))
         for side in range(len(SIDES)):
-            force = np.where(code[:, side] == index, _force(context, on_object & (palm == side)), 0.0)
+            force = np.where(code[:, side] == index, _force(context, rows[on_object & (palm == side)]), 0.0)
             for start, stop in joined(force > CONTACT_FORCE, context.ticks(EPISODE_GAP)):
                 if np.count_nonzero(force[start:stop] >= LOAD_FORCE) >= context.ticks(LOAD_TIME):
                     found.append((patch, HandContact(side, start, stop)))
@@ -119,8 +117,16 @@ def _sequence(context: CheckContext) -> list[tuple[str, HandContact]]:
     ]
 
 
-def _force(context: CheckContext, rows: NDArray[np.bool_]) -> Vector:
-    """(n,) [N] sum over the chosen `rows` (c,) of the contacts of the magnitudes of their forces, at each tick."""
-    magnitude = np.linalg.norm(context.recorder.contacts.force[rows], axis=1)
-    tick, ticks = context.recorder.contact_tick[rows], context.recorder.ticks
+def _on_palms(context: CheckContext) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int32]]:
+    """Rows (r,) of the contacts of palms with the world, and of each its side index and the world's geom."""
+    robot_geom, other_geom, outside = context.contact_sides
+    side_of_geom = context.facts.geom_palm
+    rows = np.flatnonzero(by_blocks(lambda geom, out: out & (side_of_geom[geom] >= 0), robot_geom, outside))
+    return rows, side_of_geom[robot_geom[rows]], other_geom[rows]
+
+
+def _force(context: CheckContext, rows: NDArray[np.int64]) -> Vector:
+    """(n,) [N] sum over the `rows` (r,) of the contacts of the magnitudes of their forces, at each tick."""
+    magnitude, tick = lengths(context.recorder.contacts.force[rows]), context.contact_tick(rows)
+    ticks = context.recorder.ticks
     return np.bincount(tick, weights=magnitude, minlength=ticks).astype(np.float64)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import lengths
 from wbmpc.checks.context import TOUCH, CheckContext
 from wbmpc.checks.hand_contacts import hand_contacts
 from wbmpc.checks.hold import best_hold, find_hold_of_body
@@ -54,7 +55,7 @@ class HandImpactCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        share = np.linalg.norm(context.palm_force, axis=2) / context.body_weight  # (n, 2)
+        share = lengths(context.palm_force) / context.body_weight  # (n, 2)
         tick, side = np.unravel_index(np.argmax(share), share.shape)
         touched = share[tick, side] > 0.0
         message = f"of body weight, {SIDES[side]} palm, t = {context.time[tick]:.3f} s" if touched else "never touched"
@@ -103,7 +104,7 @@ class HandsFreeAtEndCheck:
         self.config = config
 
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
-        touched = np.flatnonzero((np.linalg.norm(context.palm_force, axis=2) > TOUCH).any(axis=1))
+        touched = np.flatnonzero((lengths(context.palm_force) > TOUCH).any(axis=1))
         last = int(touched[-1]) if touched.size else -1
         free = (context.recorder.ticks - 1 - last) * context.facts.timestep
         message = f"last touch at t = {context.time[last]:.3f} s" if touched.size else "no palm ever touched anything"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import by_blocks
 from wbmpc.checks.context import SAMPLE_PERIOD, CheckContext
 from wbmpc.checks.support import com_outside
 from wbmpc.signals import Vector
@@ -14,7 +15,11 @@ def palm_error(context: CheckContext, target: tuple[float, float, float] | None)
     """(n, 2) [m] distance of each palm from the target, the scenario's (nearest, if there are several) by default."""
     targets = context.facts.reach_targets if target is None else (np.array(target),)
     palms = context.recorder.palm_position  # (n, 2, 3)
-    return np.min([np.linalg.norm(palms - point, axis=2) for point in targets], axis=0)
+
+    def nearest(rows: Vector) -> Vector:
+        return np.min([np.linalg.norm(rows - point, axis=2) for point in targets], axis=0)
+
+    return by_blocks(nearest, palms)
 
 
 def best_hold(error: Vector, width: int) -> tuple[float, int, slice]:
@@ -26,10 +31,11 @@ def best_hold(error: Vector, width: int) -> tuple[float, int, slice]:
     Returns:
         Largest error in the window, side index of the hand, and the window's ticks.
     """
-    from scipy.ndimage import maximum_filter1d  # scipy: 25 MB that many runs do without
-
-    # maximum_filter1d centres its window; `origin` makes entry k cover ticks k .. k + width - 1.
-    largest = maximum_filter1d(error, width, axis=0, origin=-(width // 2))[: len(error) - width + 1]
+    largest, covered = error, 1  # entry k is the largest of ticks k .. k + covered - 1
+    while covered < width:
+        further = min(covered, width - covered)
+        largest = np.maximum(largest[:-further], largest[further:])
+        covered += further
     largest = np.where(np.isfinite(largest), largest, np.inf)
     start, hand = np.unravel_index(np.argmin(largest), largest.shape)
     return float(largest[start, hand]), int(hand), slice(int(start), int(start) + width)

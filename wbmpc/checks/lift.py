@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import lengths
 from wbmpc.checks.context import TOUCH, CheckContext, LiftedObject
 from wbmpc.checks.result import CheckResult, at_least, at_most, failed, first_time
 from wbmpc.signals import Vector
@@ -56,7 +57,7 @@ def _held_by_palms_alone(context: CheckContext, thing: LiftedObject) -> NDArray[
     geoms = recorder.contacts.geoms
     first, second = (np.isin(geoms[:, column], list(thing.geoms)) for column in (0, 1))
     other = np.where(first, geoms[:, 1], geoms[:, 0])
-    touching = (first | second) & (np.linalg.norm(recorder.contacts.force, axis=1) > TOUCH)
+    touching = (first | second) & (lengths(recorder.contacts.force) > TOUCH)
     palms = np.zeros((recorder.ticks, 2), dtype=bool)
     foreign = np.zeros(recorder.ticks, dtype=bool)
     tick, palm = recorder.contact_tick, facts.geom_palm[other]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbmpc.checks import settings
+from wbmpc.checks.blocks import finite
 from wbmpc.checks.context import CONTACT_FORCE, CheckContext
 from wbmpc.checks.fall import down
 from wbmpc.checks.result import CheckResult, at_least, at_most, failed, first_time
@@ -19,8 +20,7 @@ class CompletedCheck:
     def evaluate(self, context: CheckContext, name: str) -> CheckResult:
         recorder, duration = context.recorder, context.facts.duration
         state = (recorder.qpos, recorder.qvel, recorder.torque, recorder.com, recorder.com_velocity)
-        finite = np.logical_and.reduce([np.isfinite(part).all(axis=1) for part in state])  # (n,)
-        broken = first_time(context.time, ~finite)
+        broken = first_time(context.time, ~finite(*state))
         if broken is not None:
             return failed(name, duration, "s", f"non-finite state at t = {broken:.3f} s", when=broken)
         end = float(context.time[-1]) + context.facts.timestep  # tick k covers [t_k, t_k + h]

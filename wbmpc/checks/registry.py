@@ -27,6 +27,7 @@ from wbmpc.checks.result import CheckResult, failed
 from wbmpc.checks.settings import CheckSettings, UniversalSettings
 from wbmpc.checks.solvers import SolverFailuresCheck
 from wbmpc.checks.whereabouts import ArrivedCheck, ClimbedCheck, FootMovedCheck, TravelledCheck
+from wbmpc.jit import trim
 from wbmpc.strict import StrictModel
 
 
@@ -91,6 +92,7 @@ def evaluate_checks(
         else:
             check: Check = CHECKS[_kind(config)](config)
             results.append(check.evaluate(context, name))
+            trim()  # the next check need not find what this one has freed still taken
     return results
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from wbmpc.checks.blocks import finite
 from wbmpc.checks.context import CheckContext
 from wbmpc.checks.stretches import joined
 from wbmpc.signals import ContactPhase, SolveStatus
@@ -20,13 +21,12 @@ NOMINAL_AGE = 3  # planner periods: a delay of one, a plan in use for another, a
 def non_finite(context: CheckContext) -> Iterator[Finding]:
     """The state became no number, or grew so fast that the loop ended the run."""
     recorder = context.recorder
-    columns = (recorder.qpos, recorder.qvel, recorder.torque, recorder.com)
-    finite = np.all([np.isfinite(column).all(axis=1) for column in columns], axis=0)
+    number = finite(recorder.qpos, recorder.qvel, recorder.torque, recorder.com)
     ended = [event.time for event in recorder.events if event.text.startswith("state is not finite")]
-    if finite.all() and not ended:
+    if number.all() and not ended:
         return
     fast = ~(np.abs(np.nan_to_num(recorder.qvel, nan=np.inf)).max(axis=1) < IMPOSSIBLE_SPEED)
-    wild = np.flatnonzero(fast | ~finite)
+    wild = np.flatnonzero(fast | ~number)
     time = float(context.time[wild[0]]) if wild.size else ended[0]
     pushed = np.linalg.norm(recorder.external_force[np.searchsorted(context.time, time - 0.01) :], axis=1).max(
         initial=0

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from wbmpc.checks.blocks import lengths
 from wbmpc.checks.contacts import undeclared_contacts
 from wbmpc.checks.context import CONTACT_FORCE, CheckContext
 from wbmpc.checks.settings import DeclaredContacts
@@ -83,7 +84,7 @@ def _not_made(context: CheckContext, time: float, what: str) -> Finding:
 def collisions(context: CheckContext, config: DeclaredContacts) -> Iterator[Finding]:
     """The robot touches itself, or what it is not to touch; the first of each pair."""
     undeclared = undeclared_contacts(context, config)
-    force = np.linalg.norm(context.recorder.contacts.force, axis=1)
+    force = lengths(context.recorder.contacts.force)
     robot_geom, other_geom, outside = context.contact_sides
     seen: set[tuple[int, int]] = set()
     for row in np.flatnonzero(undeclared):
@@ -91,7 +92,7 @@ def collisions(context: CheckContext, config: DeclaredContacts) -> Iterator[Find
         if pair in seen:
             continue
         seen.add(pair)
-        time = float(context.contact_time[row])
+        time = context.contact_time(int(row))
         a, b = (context.facts.geom_name[geom] for geom in pair)
         cause = Cause.COLLISION if outside[row] else Cause.SELF_COLLISION
         yield Finding(cause, time, np.inf, f"{a} touches {b}, {force[row]:.1f} N")
