@@ -30,10 +30,10 @@ SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ROUNDS = 3  # of every kind of run, in turn
 LOCKSTEP = ("stand", "reach")
 WALL_CLOCK = "reach"  # given one fixed plan, its robot stands
-NOTE = """Lockstep: simulated over wall time, above 1 is faster than real time. Kept in memory: `Recorder.append`, which
-every run needs, because checks judge it; written: the flushes of the `.rrd`. Wall clock: ticks that began more than a timestep late, and by how much the run ended
-late. *One fixed plan* is the same loop whose planner is asked for nothing after the first plan: what the
-machine and the tick itself miss."""
+NOTE = """Lockstep: simulated over wall time, above 1 is faster than real time. Kept in memory: `Recorder.append`,
+which every run needs, because checks judge it; written: the flushes of the `.rrd`. Wall clock: ticks that began more
+than a timestep late, and by how much the run ended late. *One fixed plan* is the same loop whose planner is asked for
+nothing after the first plan: what the machine and the tick itself miss."""
 
 
 def idle_planner() -> AbstractContextManager[None]:
