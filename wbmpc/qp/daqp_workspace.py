@@ -61,7 +61,7 @@ class DaqpWorkspace:
     def solve(self, *, matrices_changed: bool = True) -> QpSolution:
         """See `QpWorkspace.solve`."""
         start = perf_counter()
-        problem, x = self.problem, np.empty(self.problem.variables)
+        problem, x = self.problem, np.empty_like(self.problem.gradient)
         verdict, rounds = examine_and_guess(
             *(problem.hessian, problem.gradient, problem.matrix, problem.all_lower, problem.all_upper),
             *(self._softness, self._active, self._factor, self._factored and not matrices_changed),
