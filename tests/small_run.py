@@ -9,7 +9,7 @@ import numpy as np
 
 from wbmpc.recorder import Recorder
 from wbmpc.signals import (
-    MAX_CONTACTS,
+    CONTACT,
     CandidateReport,
     ContactPhase,
     Firing,
@@ -93,8 +93,9 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
     count = k // 10 % 5
     palm = np.array([[0.1, 0.15, 0.25], [0.1, -0.15, 0.25]])
     sole = np.array([[0, 0.05, 0.0], [0, -0.05, 0.0]])
-    position = np.zeros((MAX_CONTACTS, 3))
-    position[:4] = [[0.05, 0.05, 0], [-0.05, 0.05, 0], [-0.05, -0.05, 0], [0.05, -0.05, 0]]
+    contacts = np.zeros(count, CONTACT)
+    contacts["geoms"], contacts["force"], contacts["distance"] = [0, 2], [1.0, 0.0, 8.0], -2e-4
+    contacts["position"] = np.array([[0.05, 0.05, 0], [-0.05, 0.05, 0], [-0.05, -0.05, 0], [0.05, -0.05, 0]])[:count]
     truth = Truth(
         time=t,
         qpos=qpos,
@@ -109,11 +110,7 @@ def made_up_tick(k: int, rng: np.random.Generator) -> tuple[Truth, RobotState, S
         torso_up=1.0,
         external_force=np.array([5.0, 0, 0]) if 20 <= k < 40 else np.zeros(3),
         zmp=com[:2] if count else np.full(2, np.nan),
-        contact_count=count,
-        contact_geoms=np.tile([0, 2], (MAX_CONTACTS, 1)),
-        contact_position=position,
-        contact_force=np.tile([1.0, 0.0, 8.0], (MAX_CONTACTS, 1)),
-        contact_distance=np.full(MAX_CONTACTS, -2e-4),
+        contacts=contacts,
     )
     state = RobotState(
         time=t,

@@ -39,9 +39,8 @@ def test_momentum_changes_by_the_contacts_and_gravity(velocity: float) -> None:
     assert_allclose(middle, time[:-1] + 0.5e-3)
     wrench = np.zeros((TICKS, 6))
     for row, truth in zip(wrench, truths, strict=True):
-        count = truth.contact_count
-        outside = ~robot[truth.contact_geoms[:count]].all(axis=1)  # the robot's own contacts sum to nothing
-        force, arm = truth.contact_force[:count][outside], truth.contact_position[:count][outside] - truth.com
+        contacts = truth.contacts[~robot[truth.contacts["geoms"]].all(axis=1)]  # the robot's own sum to nothing
+        force, arm = contacts["force"], contacts["position"] - truth.com
         row[:3], row[3:] = force.sum(axis=0), np.cross(arm, force).sum(axis=0)
         row[2] -= mass * GRAVITY
     assert np.abs(wrench[:, 3:]).max() > 0.5  # [N m] there is something to compare

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from wbmpc.columns import EVERY_TICK, SAMPLED
 from wbmpc.recorder import Recorder
-from wbmpc.signals import MAX_CONTACTS, RobotState, Setpoint, SolveStatus, StageReport, TorqueCommand, Truth
+from wbmpc.signals import CONTACT, MAX_CONTACTS, RobotState, Setpoint, SolveStatus, StageReport, TorqueCommand, Truth
 from wbmpc.signals import PlanReport as Plan
 
 
@@ -30,8 +30,7 @@ def random_signal(cls: type, rng: np.random.Generator, **given_fields: object) -
         Truth: dict(
             qpos=size.nq, qvel=size.nv, torque=size.nj, torque_limit=size.nj, com=3, com_velocity=3,
             angular_momentum=3, palm_position=(2, 3), sole_position=(2, 3), external_force=3, zmp=2,
-            contact_position=(MAX_CONTACTS, 3), contact_force=(MAX_CONTACTS, 3),
-            contact_distance=MAX_CONTACTS, time=None, torso_up=None,
+            time=None, torso_up=None,
         ),
         RobotState: dict(
             q=size.nq, v=size.nv, sole_wrench_in_world=(2, 6), palm_force_in_world=(2, 3), time=None, mass_scale=None
@@ -57,8 +56,10 @@ def random_signal(cls: type, rng: np.random.Generator, **given_fields: object) -
     if cls is TorqueCommand:
         values.update(status=SolveStatus(int(rng.integers(0, 4))), fallback=bool(rng.random() < 0.5))
     if cls is Truth:
-        values.update(contact_count=int(rng.integers(0, MAX_CONTACTS + 1)))
-        values.update(contact_geoms=rng.integers(0, 50, (MAX_CONTACTS, 2)))
+        contacts = np.zeros(int(rng.integers(0, MAX_CONTACTS + 1)), CONTACT)
+        for name in CONTACT.names or ():
+            contacts[name] = rng.integers(0, 50, contacts[name].shape)
+        values.update(contacts=contacts)
     return cls(**(values | given_fields))
 
 
@@ -88,16 +89,18 @@ def test_round_trip_with_growth(expected: int, stride: int, ticks: int, seed: in
     for k, (truth, *_) in enumerate(history):
         contacts = recorder.contacts_at(k)
         for name in ("geoms", "position", "force", "distance"):
-            given_rows = getattr(truth, f"contact_{name}")[: truth.contact_count]
+            given_rows = truth.contacts[name]
             np.testing.assert_array_equal(getattr(contacts, name), given_rows)
             np.testing.assert_array_equal(getattr(recorder.contacts, name)[recorder.contact_tick == k], given_rows)
 
 
 def test_every_field_of_the_signals_is_recorded() -> None:
     """A field added to a signal must be recorded or excluded here on purpose."""
-    elsewhere = {Truth: {"contact_geoms", "contact_position", "contact_force", "contact_distance"}}
+    elsewhere = {Truth: {"contacts"}}
     for cls in (Truth, RobotState, Setpoint, TorqueCommand):
-        kept = [name for of, _, layout in EVERY_TICK + SAMPLED if of is cls for name in layout]
+        kept = [
+            name for of, _, layout in EVERY_TICK + SAMPLED if of is cls for name in layout if name != "contact_count"
+        ]
         declared = {field.name for field in fields(cls)}
         same_as_truth = set() if cls is Truth else {"time"}
         assert sorted(kept) == sorted(declared - elsewhere.get(cls, set()) - same_as_truth)

@@ -116,7 +116,7 @@ class Table:
         self._numbers, self._arrays = _picked(numbers), _picked(arrays)
         self._pack = Struct("".join(_CODES[columns[i][1]] for i in numbers) + "0q").pack
         self.rows = np.zeros(max(1, rows), np.dtype([columns[i] for i in (*numbers, *arrays)], align=True))
-        self._bytes = _bytes_of(self.rows)
+        self._bytes = bytes_of(self.rows)
         length = len(self._pack(*(0 for _ in numbers))) + sum(self.rows.dtype[columns[i][0]].itemsize for i in arrays)
         self._size = self.rows.itemsize
         self._gap = bytes(self._size - length)
@@ -134,7 +134,7 @@ class Table:
             self._check(values)
         elif k == len(self.rows):
             self.rows = np.concatenate([self.rows, np.zeros_like(self.rows)])
-            self._bytes = _bytes_of(self.rows)
+            self._bytes = bytes_of(self.rows)
         row = b"".join((self._pack(*self._numbers(values)), *self._arrays(values), self._gap))
         size = self._size
         self._bytes[k * size : (k + 1) * size] = row
@@ -161,5 +161,6 @@ def _picked(indices: Sequence[int]) -> Callable[[tuple[Any, ...]], Iterable[Any]
     return itemgetter(*indices) if len(indices) > 1 else lambda values: [values[i] for i in indices]
 
 
-def _bytes_of(rows: NDArray[Any]) -> memoryview:
+def bytes_of(rows: NDArray[Any]) -> memoryview:
+    """The same memory as bytes."""
     return rows.view(np.uint8).data

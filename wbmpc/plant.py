@@ -13,7 +13,7 @@ from wbmpc.plant_kernels import contact_sums, servo_torque
 from wbmpc.robot import Robot
 from wbmpc.scenario import Disturbance, Impulse, SensorSettings
 from wbmpc.scenario.random_streams import Stream, generator
-from wbmpc.signals import MAX_CONTACTS, SIDES, Measurement, Truth, Vector
+from wbmpc.signals import CONTACT, MAX_CONTACTS, SIDES, Measurement, Truth, Vector
 
 MOST_SEEN = 4 * MAX_CONTACTS  # of MuJoCo's contacts, many of which may carry no force
 
@@ -70,6 +70,8 @@ class Plant:
         }
         kinds = (((2,), int), ((), int), ((9,), float), ((3,), float), ((), float), ((), int))
         self._seen = tuple(np.zeros((MOST_SEEN, *shape), dtype=kind) for shape, kind in kinds)  # see contact_sums
+        self._kept = np.zeros(MAX_CONTACTS, CONTACT)
+        self._kept_columns = tuple(self._kept[name] for name in ("geoms", "position", "force", "distance"))
         self._sole_wrench = np.zeros((2, 6))
         self._palm_force = np.zeros((2, 3))
         self.data.qpos[:] = qpos
@@ -170,7 +172,7 @@ class Plant:
         sole, palm = sites[:2], sites[2:]
         torso_up = float(d.xmat[self._torso, 8])
         self._physics.step2()
-        contacts = self._contacts(sole)
+        contacts, zmp = self._contacts(sole)
         self._physics.step1()
         return Truth(
             time=time,
@@ -185,12 +187,8 @@ class Plant:
             sole_position=sole,
             torso_up=torso_up,
             external_force=external,
-            zmp=contacts[5],
-            contact_count=contacts[0],
-            contact_geoms=contacts[1],
-            contact_position=contacts[2],
-            contact_force=contacts[3],
-            contact_distance=contacts[4],
+            zmp=zmp,
+            contacts=contacts,
         )
 
     def _push(self, time: float) -> Vector:
@@ -209,12 +207,9 @@ class Plant:
                 total += now
         return total
 
-    def _contacts(self, sole: Vector) -> tuple[int, NDArray[np.int64], Vector, Vector, Vector, Vector]:
+    def _contacts(self, sole: Vector) -> tuple[NDArray[np.void], Vector]:
         """Contacts of the step just made, forces on the robot, and the ZMP; also the wrenches the force sensors see."""
-        d, contact, seen = self.data, self.data.contact, self._seen
-        geoms, zmp = np.full((MAX_CONTACTS, 2), -1, dtype=np.int64), np.empty(2)
-        position, force = np.zeros((MAX_CONTACTS, 3)), np.zeros((MAX_CONTACTS, 3))
-        distance = np.zeros(MAX_CONTACTS)
+        d, contact, seen, zmp = self.data, self.data.contact, self._seen, np.empty(2)
         count = min(d.ncon, len(seen[0]))
         if count:
             fields = (contact.geom, contact.efc_address, contact.frame, contact.pos, contact.dist, contact.dim)
@@ -222,9 +217,9 @@ class Plant:
                 cell[:count] = field[:count]
         kept = contact_sums(
             *(count, seen, d.efc_force, self._is_robot, self._part, sole),
-            *((geoms, position, force, distance), self._sole_wrench, self._palm_force, zmp),
+            *(self._kept_columns, self._sole_wrench, self._palm_force, zmp),
         )
-        return kept, geoms, position, force, distance, zmp
+        return self._kept[:kept].copy(), zmp
 
 
 def _noise_scales(sensors: SensorSettings, joints: int) -> Vector:

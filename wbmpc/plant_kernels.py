@@ -33,7 +33,7 @@ def contact_sums(count, seen, efc_force, is_robot, part, sole, truth, sole_wrenc
         seen: per contact: geoms (2,), first row in `efc_force` (-1: none), frame (9,), position (3,), distance, dim.
         is_robot: per geom; `part`: per geom 0, 1 for the soles, 2, 3 for the palms, else -1.
         sole: (2, 3) [m] the soles' sites.
-        truth: filled: geoms (m, 2), position (m, 3), force (m, 3), distance (m,), at most m contacts.
+        truth: columns of CONTACT, filled, at most as many contacts as there are rows.
         sole_wrench: (2, 6) filled: force and moment about the sole's site; palm_force: (2, 3) filled.
         zmp: (2,) filled: centre of pressure of both soles on the plane of their mean height; nan without foot force.
     """

@@ -16,8 +16,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from wbmpc.columns import EVERY_TICK, SAMPLED, Table
-from wbmpc.signals import PlanReport, RobotState, Setpoint, TorqueCommand, Truth
+from wbmpc.columns import EVERY_TICK, SAMPLED, Table, bytes_of
+from wbmpc.signals import CONTACT, PlanReport, RobotState, Setpoint, TorqueCommand, Truth
 from wbmpc.timing import LoopTiming
 
 
@@ -50,7 +50,6 @@ class Contacts:
     distance: NDArray[np.float64]  # (c,) [m] negative: penetration
 
 
-_CONTACT = np.dtype([("geoms", np.int32, 2), ("position", float, 3), ("force", float, 3), ("distance", float)])
 _truth, _outcome = (attrgetter(*fields) for _, _, fields in EVERY_TICK)
 _state, _setpoint, _command = (attrgetter(*fields) for _, _, fields in SAMPLED)
 
@@ -88,8 +87,8 @@ class Recorder:
         self._state = self._every.bytes_of("qpos", "qvel")
         self._contact_total = 0
         # In one piece, which the system gives page by page as it is written: most runs have fewer contacts.
-        self._contact_rows = np.zeros(12 * max(1, expected_ticks), _CONTACT)
-        self._contacts = _columns(self._contact_rows)
+        self._contact_rows = np.zeros(12 * max(1, expected_ticks), CONTACT)
+        self._contacts, self._contact_bytes = _columns(self._contact_rows), bytes_of(self._contact_rows)
         self._ticks = 0
         self._hash = hashlib.sha256()
         self.plans: list[PlanReport] = []
@@ -205,18 +204,15 @@ class Recorder:
     # ---------------------------------------------------------------- inside
 
     def _append_contacts(self, truth: Truth) -> None:
-        count = truth.contact_count
-        start, stop = self._contact_total, self._contact_total + count
+        start = self._contact_total
+        stop = start + len(truth.contacts)
         if stop > len(self._contact_rows):
             # At least one tick's worth of room, however small the table was.
-            more = np.zeros(len(self._contact_rows) + 1000, _CONTACT)
+            more = np.zeros(len(self._contact_rows) + 1000, CONTACT)
             self._contact_rows = np.concatenate([self._contact_rows, more])
-            self._contacts = _columns(self._contact_rows)
-        table = self._contacts
-        table.geoms[start:stop] = truth.contact_geoms[:count]
-        table.position[start:stop] = truth.contact_position[:count]
-        table.force[start:stop] = truth.contact_force[:count]
-        table.distance[start:stop] = truth.contact_distance[:count]
+            self._contacts, self._contact_bytes = _columns(self._contact_rows), bytes_of(self._contact_rows)
+        size = CONTACT.itemsize  # as bytes: numpy copies structures field by field
+        self._contact_bytes[start * size : stop * size] = truth.contacts.tobytes()
         self._contact_total = stop
 
 

@@ -19,7 +19,17 @@ from wbmpc.record import record
 Vector = NDArray[np.float64]
 GRAVITY = 9.81  # [m/s²]
 SIDES = ("left", "right")
-MAX_CONTACTS = 48  # slots for MuJoCo contacts in one tick's truth
+MAX_CONTACTS = 48  # of MuJoCo's, in one tick's truth
+CONTACT = (
+    np.dtype(  # geom ids; where, and the force on the robot (on the second geom when both are the robot's), in world
+        [
+            ("geoms", np.int32, 2),
+            ("position", float, 3),  # [m]
+            ("force", float, 3),  # [N]
+            ("distance", float),  # [m] negative: penetration
+        ]
+    )
+)
 
 
 class SolveStatus(IntEnum):
@@ -225,8 +235,9 @@ class Truth:
     torso_up: float  # cosine of the torso's tilt: 1 upright, 0 lying
     external_force: Vector  # (3,) [N] declared disturbance acting now, sum over bodies
     zmp: Vector  # (2,) [m] measured centre of pressure of the feet; nan when no foot pushes
-    contact_count: int
-    contact_geoms: NDArray[np.int64]  # (MAX_CONTACTS, 2) geom ids; rows past contact_count are -1
-    contact_position: Vector  # (MAX_CONTACTS, 3) [m]
-    contact_force: Vector  # (MAX_CONTACTS, 3) [N] in world, on the robot (on the second geom when both are the robot's)
-    contact_distance: Vector  # (MAX_CONTACTS,) [m] negative: penetration
+    contacts: NDArray[np.void]  # (c,) of CONTACT: those that carry force, c ≤ MAX_CONTACTS
+
+    @property
+    def contact_count(self) -> int:
+        """c"""
+        return len(self.contacts)

@@ -10,7 +10,7 @@ import numpy as np
 from wbmpc.checks.context import CheckContext, Facts
 from wbmpc.columns import EVERY_TICK, SAMPLED
 from wbmpc.recorder import Recorder
-from wbmpc.signals import ContactPhase, RobotState, Setpoint, SolveStatus, StageReport, TorqueCommand, Truth
+from wbmpc.signals import CONTACT, ContactPhase, RobotState, Setpoint, SolveStatus, StageReport, TorqueCommand, Truth
 
 FLOOR, LEFT_FOOT, RIGHT_FOOT, LEFT_PALM, RIGHT_PALM, TORSO, TABLE, WALL = range(8)
 GEOMS = ("floor", "left_foot", "right_foot", "left_palm", "right_palm", "torso", "table", "wall")
@@ -93,10 +93,7 @@ class SyntheticRun:
                     setattr(truth, name, getattr(self, name)[tick])
             contacts = self.contacts[tick]
             truth.contact_count = len(contacts)
-            truth.contact_geoms = np.array([c[:2] for c in contacts]).reshape(-1, 2)
-            truth.contact_position = np.zeros((len(contacts), 3))
-            truth.contact_force = np.array([c[2] for c in contacts]).reshape(-1, 3)
-            truth.contact_distance = np.array([c[3] for c in contacts])
+            truth.contacts = np.array([(c[:2], np.zeros(3), c[2], c[3]) for c in contacts], CONTACT)
             state, setpoint, command = (SimpleNamespace(**fields) for fields in zeros[1:])
             command.fallback, command.solve_time = self.fallback[tick], 1e-4
             recorder.append(truth, state, setpoint, command)  # type: ignore[arg-type]
